@@ -1,0 +1,69 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Rigid transforms and pinhole projection. `T_a_b` maps points of frame b into frame a."""
+
+import zlib
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+
+def matrix_from_pose(translation, rotation_xyzw):
+    """Return T_a_b (4, 4) from a translation (3,) in metres and a quaternion (4,) xyzw."""
+    T_a_b = np.eye(4)
+    T_a_b[:3, :3] = Rotation.from_quat(rotation_xyzw).as_matrix()
+    T_a_b[:3, 3] = translation
+    return T_a_b
+
+
+def pose_from_matrix(T_a_b):
+    """Return (translation (3,), rotation_xyzw (4,) with w >= 0) of a (4, 4) transform."""
+    return T_a_b[:3, 3].copy(), Rotation.from_matrix(T_a_b[:3, :3]).as_quat(canonical=True)
+
+
+def inverse(T_a_b):
+    """Return T_b_a of a rigid (4, 4) transform."""
+    T_b_a = np.eye(4)
+    T_b_a[:3, :3] = T_a_b[:3, :3].T
+    T_b_a[:3, 3] = -T_a_b[:3, :3].T @ T_a_b[:3, 3]
+    return T_b_a
+
+
+def transform(T_a_b, points_b):
+    """Return points (n, 3) of frame b in frame a."""
+    return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
+
+
+def project(K, points_camera):
+    """Return (u, v) float arrays (n,) of points (n, 3) in the optical frame, z > 0."""
+    z = points_camera[:, 2]
+    return (K[0, 0] * points_camera[:, 0] / z + K[0, 2],
+            K[1, 1] * points_camera[:, 1] / z + K[1, 2])
+
+
+def rays(K, height, width):
+    """Return (H, W, 3) float64 directions with z = 1 through the pixel centres."""
+    u, v = np.meshgrid(np.arange(width), np.arange(height))
+    return np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(u.shape)], -1)
+
+
+def back_project(depth, camera):
+    """Return (H, W, 3) float64 world points of a rectified (H, W) depth image; NaN stays."""
+    points = rays(camera.K, *depth.shape) * depth[..., None]
+    return transform(camera.T_world_camera, points)
+
+
+def posed_vertices(model, translation, rotation_xyzw, size):
+    """Return (V, 3) world vertices of a GenericModel scaled to `size` and posed."""
+    scaled = model.vertices * (np.asarray(size, np.float64) / np.maximum(model.extents, 1e-9))
+    return transform(matrix_from_pose(translation, rotation_xyzw), scaled)
+
+
+def stage_rng(seed, stage, *keys):
+    """
+    Return the numpy Generator of one stage, independent of what other stages drew.
+
+    Separate processes that know the seed and the stage's name draw the same numbers, so the
+    nodes and the one-process chain agree.
+    """
+    return np.random.default_rng([int(seed), zlib.crc32(stage.encode()), *map(int, keys)])

@@ -7,9 +7,8 @@ Everything behind this file sees float32 metres with NaN = no reading (REP-118).
 bags and the ROS layer all decode here, so that they agree bit for bit.
 """
 
-import numpy as np
-
 from hooc_perception.errors import HoocError
+import numpy as np
 
 MILLIMETRES = '16UC1'
 METRES = '32FC1'

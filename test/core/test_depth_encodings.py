@@ -4,12 +4,15 @@
 
 import struct
 
+from hooc_perception.core.depth_encodings import (
+    counts_from_depth,
+    decode_depth,
+    depth_from_counts,
+    encode_depth,
+)
+from hooc_perception.errors import HoocError
 import numpy as np
 import pytest
-
-from hooc_perception.core.depth_encodings import (
-    counts_from_depth, decode_depth, depth_from_counts, encode_depth)
-from hooc_perception.errors import HoocError
 
 
 @pytest.mark.parametrize('order, is_bigendian', [('<', 0), ('>', 1)])

@@ -1,0 +1,242 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Reading files that somebody else wrote: bounded, checked, and with errors that name the field.
+
+Every function raises HoocError with one sentence: file, field, mend.
+"""
+
+import json
+import math
+import os
+from pathlib import Path
+import re
+import struct
+import tempfile
+import zlib
+
+import cv2
+from hooc_perception.core.depth_encodings import depth_from_counts
+from hooc_perception.errors import HoocError
+import numpy as np
+import yaml
+
+MAX_TEXT_BYTES = 8 << 20
+MAX_PNG_BYTES = 64 << 20
+MAX_SIDE = 8192
+_LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
+_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.\-]*\Z')
+_ROS_TOKEN = re.compile(r'[A-Za-z][A-Za-z0-9_]*\Z')
+_PNG_KINDS = {0: 'grey', 2: 'colour', 3: 'palette', 4: 'grey with alpha', 6: 'colour with alpha'}
+
+
+def read_bytes(path, limit):
+    """Return the content of a file of at most `limit` bytes."""
+    try:
+        size = os.stat(path).st_size
+        if size > limit:
+            raise HoocError(f'{path}: {size} bytes exceed the limit of {limit}; '
+                            'check that this is the right file')
+        return Path(path).read_bytes()
+    except (FileNotFoundError, NotADirectoryError):
+        raise HoocError(f'{path}: the file is missing; add it or correct its name') from None
+    except OSError as error:
+        raise HoocError(f'{path}: cannot be read ({error.strerror}); '
+                        'check the file and its permissions') from None
+
+
+def read_yaml(path):
+    """Return the mapping that a YAML file holds; tags that make objects are refused."""
+    text = read_bytes(path, MAX_TEXT_BYTES)
+    try:
+        content = yaml.load(text, Loader=_LOADER)
+    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        mark = getattr(error, 'problem_mark', None)
+        where = f' at line {mark.line + 1}' if mark else ''
+        raise HoocError(f'{path}: not valid YAML{where}; correct the syntax there') from None
+    return mapping(content, f'{path}:')
+
+
+def read_json(path):
+    """Return the mapping that a JSON file holds."""
+    text = read_bytes(path, MAX_TEXT_BYTES)
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise HoocError(f'{path}: not valid JSON at line {error.lineno}; '
+                        'correct the syntax there') from None
+    except (UnicodeDecodeError, RecursionError):
+        raise HoocError(f'{path}: not valid JSON; write it as UTF-8 text again') from None
+    return mapping(content, f'{path}:')
+
+
+def write_atomically(path, text):
+    """Write a text file so that a reader sees the old content or the new, never a part."""
+    path = Path(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
+        try:
+            with os.fdopen(handle, 'w', encoding='utf-8') as file:
+                file.write(text)
+            os.chmod(temporary, 0o644)
+            os.replace(temporary, path)
+        except BaseException:
+            os.unlink(temporary)
+            raise
+    except OSError as error:
+        raise HoocError(f'{path}: cannot be written ({error.strerror}); '
+                        'choose another place or free some space') from None
+
+
+def mapping(value, where):
+    """Return `value` if it is a mapping; `where` names file and field in the error."""
+    if not isinstance(value, dict):
+        raise HoocError(f'{where} must hold "key: value" entries, not {_kind(value)}')
+    return value
+
+
+def sequence(value, where):
+    """Return `value` if it is a list."""
+    if not isinstance(value, list):
+        raise HoocError(f'{where} must be a list, not {_kind(value)}')
+    return value
+
+
+def required(entry, key, where):
+    """Return entry[key], naming the missing field where there is none."""
+    if key not in entry:
+        raise HoocError(f'{where} {key} is missing; add it')
+    return entry[key]
+
+
+def numbers(value, count, where):
+    """Return a float64 array of exactly `count` finite numbers (a count of None: any)."""
+    values = sequence(value, where)
+    if count is not None and len(values) != count:
+        raise HoocError(f'{where} has {len(values)} numbers; give {count}')
+    return np.array([number(v, where) for v in values], np.float64)
+
+
+def number(value, where):
+    """Return a finite float; YAML reads 1e-3 (without a point) as text, so text may do."""
+    try:
+        if isinstance(value, bool):
+            raise ValueError
+        result = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise HoocError(f'{where} contains {value!r:.60}; give a number') from None
+    if not math.isfinite(result):
+        raise HoocError(f'{where} contains {value}; give a finite number')
+    return result
+
+
+def whole(value, low, high, where):
+    """Return an int in low..high."""
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise HoocError(f'{where} is {value!r:.60}; give a whole number from {low} to {high}')
+    return value
+
+
+def name(value, where):
+    """Return text that may serve as a file name: letters, digits, _ - and ."""
+    if not isinstance(value, str) or not _NAME.match(value) or len(value) > 100:
+        raise HoocError(f'{where} is {value!r:.60}; use letters, digits, _, - and . '
+                        '(in quotes if it is a number)')
+    return value
+
+
+def ros_token(value, where):
+    """Return text that may stand in a topic's name."""
+    if not isinstance(value, str) or not _ROS_TOKEN.match(value) or len(value) > 100:
+        raise HoocError(f'{where} is {value!r:.60}; topics are named after it, so begin with '
+                        'a letter and use letters, digits and _')
+    return value
+
+
+def unique(names, where):
+    """Return `names` as a tuple if no two are equal."""
+    seen = set()
+    for item in names:
+        if item in seen:
+            raise HoocError(f'{where} names {item!r} twice; remove or rename one of them')
+        seen.add(item)
+    return tuple(names)
+
+
+def inside(root, relative, where):
+    """Return root / relative, an existing file that lies inside `root`, links resolved."""
+    if not isinstance(relative, str) or not relative or '\0' in relative:
+        raise HoocError(f'{where} is {relative!r:.60}; give a file name relative to {root}')
+    path = Path(root) / relative
+    if not path.resolve().is_relative_to(Path(root).resolve()):
+        raise HoocError(f'{where} is {relative!r:.200}, which leaves {root}; '
+                        'move the file inside and name it relative to that folder')
+    if not path.is_file():
+        raise HoocError(f'{where} names {path}, which does not exist; '
+                        'add the file or correct the name')
+    return path
+
+
+def read_png(path, width, height, bits):
+    """
+    Return the (height, width) uint16 or uint8 pixels of a grey PNG with 16 or 8 bits.
+
+    Header, size and checksums are checked before anything is decoded: OpenCV would hand out
+    the readable part of a truncated file without a word.
+    """
+    data = read_bytes(path, MAX_PNG_BYTES)
+    if data[:8] != b'\x89PNG\r\n\x1a\n' or len(data) < 33:
+        raise HoocError(f'{path}: not a PNG image; save it as a {bits}-bit grey PNG')
+    found_width, found_height, found_bits, kind = struct.unpack('>IIBB', data[16:26])
+    if (found_bits, kind) != (bits, 0):
+        raise HoocError(f'{path}: a {found_bits}-bit {_PNG_KINDS.get(kind, "unknown")} PNG; '
+                        f'save it as a {bits}-bit grey PNG')
+    if (found_width, found_height) != (width, height):
+        raise HoocError(f'{path}: the image has {found_width} x {found_height} pixels, but its '
+                        f'camera says width {width} and height {height}; correct one of them')
+    if not _complete(data):
+        raise HoocError(f'{path}: the PNG is truncated or damaged; copy or record it again')
+    pixels = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
+    if pixels is None or pixels.shape != (height, width):
+        raise HoocError(f'{path}: the PNG cannot be decoded; copy or record it again')
+    return pixels
+
+
+def read_depth_png(path, width, height, unit):
+    """Return (H, W) float32 metres, NaN = none, of a 16-bit PNG with `unit` metres a count."""
+    counts = read_png(path, width, height, 16)
+    if not counts.any():
+        raise HoocError(f'{path}: every depth pixel is 0, so the image holds no reading; '
+                        'record this view again or remove the scene')
+    return depth_from_counts(counts, unit)
+
+
+def write_png(path, pixels):
+    """Write (H, W) uint8 or uint16 pixels as a grey PNG."""
+    ok, data = cv2.imencode('.png', pixels)
+    if not ok:
+        raise HoocError(f'{path}: the image of shape {pixels.shape} cannot be made into a PNG')
+    Path(path).write_bytes(data.tobytes())
+
+
+def _complete(data):
+    """Say whether all chunks up to IEND are there with correct checksums."""
+    at = 8
+    while at + 12 <= len(data):
+        length, = struct.unpack('>I', data[at:at + 4])
+        end = at + 12 + length
+        if end > len(data):
+            return False
+        if zlib.crc32(data[at + 4:end - 4]) != struct.unpack('>I', data[end - 4:end])[0]:
+            return False
+        if data[at + 4:at + 8] == b'IEND':
+            return True
+        at = end
+    return False
+
+
+def _kind(value):
+    """Return what a parsed value is, in a user's words."""
+    return {dict: 'entries', list: 'a list', str: 'text', type(None): 'nothing'}.get(
+        type(value), f'{value!r:.40}')

@@ -1,0 +1,176 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Labelled synthetic views of generic models: what the forest learns from."""
+
+from dataclasses import dataclass
+
+import joblib
+import numpy as np
+from tqdm import tqdm
+
+from hooc_perception.core.config import Config, param
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import RectifiedView
+from hooc_perception.errors import HoocError
+from hooc_perception.synthesis.rigs import jittered_rig, random_rig, undistorted
+from hooc_perception.synthesis.room import draw_room, RoomConfig
+from hooc_perception.synthesis.scatter import ScatterConfig, Scatterer
+from hooc_perception.synthesis.sensor import miscalibrated, randomised, sense, SensorConfig
+
+
+@dataclass(frozen=True)
+class TrainingConfig(Config):
+    """What training scenes look like; the defaults are the paper's."""
+
+    arrangement: str = param('scatter', 'Upright and apart (scatter: the paper) or dropped and '
+                             'at rest by physics (settled).', choices=('scatter', 'settled'))
+    reshape_strength: float = param(0.0, 'How far objects depart from the generic shape; 1 = '
+                                    'as real objects do.', '', 0.0, 3.0)
+    renders: int = param(1, 'Scenes rendered from one settled arrangement, each from another '
+                         'rig and with other noise.', '', 1, 100)
+    rig: str = param('given', 'The given cameras, the given ones moved a little, or unlike ones '
+                     'anywhere around the table.', choices=('given', 'jittered', 'random'))
+    cameras_low: int = param(1, 'Fewest cameras of a random rig.', '', 1, 16)
+    cameras_high: int = param(4, 'Most cameras of a random rig.', '', 1, 16)
+    calibration_rad: float = param(0.0015, 'Standard deviation of the written rotation of a '
+                                   'camera from the true one, each axis.', 'rad', 0.0, 0.2)
+    calibration_m: float = param(0.0015, 'The same for its place, each axis.', 'm', 0.0, 0.2)
+    randomise_sensor: bool = param(False, 'Draw the sensor\'s figures anew for every scene.')
+    translucent: float = param(0.0, 'Share of objects that are taken for translucent.', '',
+                               0.0, 1.0)
+    scatter: ScatterConfig = param(ScatterConfig(), 'How scattered scenes are drawn.')
+    sensor: SensorConfig = param(SensorConfig(), 'The simulated sensor.')
+    room: RoomConfig = param(RoomConfig(), 'Table and surroundings.')
+
+
+PAPER = TrainingConfig()
+BEST = TrainingConfig(arrangement='settled', reshape_strength=1.0, renders=3, rig='jittered',
+                      randomise_sensor=True, translucent=0.08)
+
+
+@dataclass(frozen=True)
+class TrainingScene:
+    """
+    One labelled synthetic scene.
+
+    :ivar views: RectifiedView a camera; the cameras are as a calibration would give them.
+    :ivar labels: (H, W) uint8 a view, class ids, 0 = background; also where depth is NaN.
+    :ivar objects: the PlacedObject list that was rendered.
+    """
+
+    views: tuple
+    labels: tuple
+    objects: tuple
+
+
+def render_scene(objects, cameras, rng, config=TrainingConfig(), translucent=()):
+    """
+    Return the TrainingScene of posed objects seen by rectified cameras.
+
+    :param objects: sequence of PlacedObject.
+    :param translucent: indices into `objects` that carry the error of glass.
+    """
+    room = draw_room(rng, config.room).meshes()
+    solid = [(o.vertices_world, o.faces) for o in objects]
+    meshes = solid + room
+    classes = np.zeros(len(meshes) + 1, np.uint8)
+    classes[:len(objects)] = [o.category for o in objects]
+    sensor = randomised(config.sensor, rng) if config.randomise_sensor else config.sensor
+    views, labels = [], []
+    for camera in cameras:
+        true = undistorted(camera)
+        depth, ids = render_depth(meshes, true)
+        behind = None
+        if len(translucent):
+            behind = render_depth([m for i, m in enumerate(meshes) if i not in translucent],
+                                  true)[0]
+        ids[ids >= len(objects)] = -1
+        measured, seen = sense(depth, ids, true, rng, sensor, translucent, behind)
+        written = miscalibrated(true, rng, config.calibration_rad, config.calibration_m)
+        views.append(RectifiedView(written, measured))
+        labels.append(classes[seen])
+    return TrainingScene(tuple(views), tuple(labels), tuple(objects))
+
+
+def training_scene(models, cameras, rng, config=TrainingConfig(), scatterer=None,
+                   objects=None):
+    """
+    Return one random TrainingScene.
+
+    :param models: GenericModel sequence; class id c is models[c - 1].
+    :param cameras: Camera sequence of the set; lens distortion is ignored.
+    :param scatterer: a Scatterer of the same models, kept between calls for speed.
+    :param objects: a ready arrangement to render instead of a new one.
+    """
+    if not cameras:
+        raise HoocError('training scenes need at least one camera, but there are none')
+    if objects is None and config.arrangement == 'settled':
+        objects = _settled(models, rng, config)
+    elif objects is None:
+        objects = (scatterer or Scatterer(models, config.scatter)).scene(rng)
+        if config.reshape_strength > 0:
+            objects = _reshaped_in_place(objects, rng, config.reshape_strength)
+    if config.rig == 'random':
+        cameras = random_rig(cameras, rng, config.cameras_low, config.cameras_high)
+    elif config.rig == 'jittered':
+        cameras = jittered_rig(cameras, rng)
+    translucent = tuple(np.flatnonzero(rng.random(len(objects)) < config.translucent).tolist())
+    return render_scene(objects, cameras, rng, config, translucent)
+
+
+def training_scenes(models, cameras, config=TrainingConfig(), seed=0, n=500, progress=False,
+                    stage='training', jobs=1):
+    """
+    Yield n TrainingScenes; scene k depends on (seed, stage, k) alone.
+
+    :param stage: name of the random stream: other scenes, such as those that fill the
+        leaves of a forest, take another name.
+    :param jobs: processes; the order and the scenes are the same for any number.
+    """
+    settled = config.arrangement == 'settled'
+    group = config.renders if settled else 8
+    starts = range(0, n, group)
+    run = joblib.delayed(_group)
+    parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
+    scenes = parallel(run(tuple(models), tuple(cameras), config, seed, stage, start,
+                          min(start + group, n)) for start in starts)
+    for batch in tqdm(scenes, total=len(starts), disable=not progress, unit='batch',
+                      desc='synthetic scenes'):
+        yield from batch
+
+
+_SCATTERERS = {}
+
+
+def _scatterer(models, config):
+    """Return this process's Scatterer of the models: collision shapes are built once."""
+    key = (tuple((m.name, len(m.vertices), tuple(m.extents)) for m in models), config)
+    if key not in _SCATTERERS:
+        _SCATTERERS.clear()
+        _SCATTERERS[key] = Scatterer(models, config)
+    return _SCATTERERS[key]
+
+
+def _group(models, cameras, config, seed, stage, start, stop):
+    """Return the scenes start..stop - 1; in a settled group they share one arrangement."""
+    objects = scatterer = None
+    if config.arrangement == 'settled':
+        objects = _settled(models, stage_rng(seed, stage + '/settle', start), config)
+    else:
+        scatterer = _scatterer(models, config.scatter)
+    return [training_scene(models, cameras, stage_rng(seed, stage, k), config, scatterer,
+                           objects) for k in range(start, stop)]
+
+
+def _settled(models, rng, config):
+    """Return a settled arrangement of reshaped models."""
+    # Imported late: physics is not needed for the paper's scenes.
+    from hooc_perception.synthesis.settle import settled_models
+    return settled_models(models, rng, config.scatter, config.reshape_strength)
+
+
+def _reshaped_in_place(objects, rng, strength):
+    """Return scattered objects with perturbed shapes, still standing on the table."""
+    from hooc_perception.synthesis.reshape import reshape_placed
+    return [reshape_placed(o, rng, strength) for o in objects]

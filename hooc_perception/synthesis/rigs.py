@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Camera rigs around a table: drawn at random, or a given rig moved a little."""
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
 from hooc_perception.core.types import Camera
 from hooc_perception.synthesis.sensor import miscalibrated
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 
 def look_at(position, target):

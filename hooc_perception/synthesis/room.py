@@ -4,9 +4,8 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from hooc_perception.core.config import Config, param
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -15,7 +14,7 @@ class RoomConfig(Config):
 
     table_low: float = param(1.2, 'Shortest side of the table.', 'm', 0.3, 20.0)
     table_high: float = param(1.8, 'Longest side of the table.', 'm', 0.3, 20.0)
-    offset: float = param(0.1, 'Standard deviation of the table\'s centre from the world\'s '
+    offset: float = param(0.1, "Standard deviation of the table's centre from the world's "
                           'origin, along each axis.', 'm', 0.0, 5.0)
     empty: float = param(0.15, 'Share of scenes with nothing around the table.', '', 0.0, 1.0)
 

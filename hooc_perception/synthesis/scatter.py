@@ -10,13 +10,13 @@ physical overlap. How close, the paper does not say; here they are packed as on 
 from dataclasses import dataclass
 
 import fcl
-import numba as nb
-import numpy as np
-from scipy.spatial.transform import Rotation
-
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import posed_vertices
 from hooc_perception.errors import HoocError
+import numba as nb
+import numpy as np
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class ScatterConfig(Config):
     pose: str = param('upright', 'Model z axis up (upright) or a stable resting pose of the '
                       'model (resting); the yaw is free in both.',
                       choices=('upright', 'resting'))
-    size_spread: float = param(0.0, 'Standard deviation of the logarithm of an object\'s size '
-                               'over its model\'s; 0 = the model\'s own.', '', 0.0, 0.5)
-    crowding: float = param(0.45, 'Share of the occupied disc that footprints would cover; '
-                            'large = close together.', '', 0.02, 0.9)
+    size_spread: float = param(0.0, "Standard deviation of the logarithm of an object's size "
+                               "over its model's; 0 = the model's own.", '', 0.0, 0.5)
+    crowding: float = param(0.90, 'Share of the occupied disc that footprints would cover; '
+                            'large = close together.', '', 0.02, 1.5)
     tries: int = param(40, 'Places tried for an object before it is left out.', '', 1, 1000)
 
 
@@ -65,7 +65,7 @@ class Scatterer:
     """
 
     def __init__(self, models, config=ScatterConfig()):
-        """:raises HoocError: where there are no models or the range of counts is empty."""
+        """Raise HoocError where there are no models or the range of counts is empty."""
         if not models:
             raise HoocError('a training scene needs at least one model, but there are none')
         if config.objects_low > config.objects_high:
@@ -100,7 +100,7 @@ class Scatterer:
                   for i, step, scale in zip(chosen, steps, scales)]
         # The disc's area is the sum of the footprints' over the share they are to cover.
         area = sum(d.footprint for d in drafts)
-        radius = np.sqrt(area / (np.pi * config.crowding)) * rng.uniform(0.85, 1.2)
+        radius = np.sqrt(area / (np.pi * config.crowding)) * rng.uniform(0.8, 1.25)
         placed = []
         # Large things first: small ones still find room between them.
         for draft in sorted(drafts, key=lambda d: -d.footprint):
@@ -121,7 +121,7 @@ class Scatterer:
         """Find a free place for the draft; return whether there is one."""
         for attempt in range(self.config.tries):
             # The disc grows a little with every try, so that nearly everything finds room.
-            r = radius * (1 + attempt / self.config.tries) * np.sqrt(rng.random())
+            r = radius * (1 + 0.7 * attempt / self.config.tries) * np.sqrt(rng.random())
             angle = rng.uniform(0, 2 * np.pi)
             draft.move(r * np.cos(angle), r * np.sin(angle))
             if not any(overlapping(draft, other) for other in placed):
@@ -138,7 +138,7 @@ class _Draft:
         self.turned = (model.vertices * scale) @ rotation.as_matrix().T
         self.low, self.high = self.turned.min(axis=0), self.turned.max(axis=0)
         self.circle = 0.5 * np.linalg.norm((self.high - self.low)[:2])
-        self.footprint = float(np.prod((self.high - self.low)[:2]))
+        self.footprint = ConvexHull(self.turned[:, :2]).volume
         self.size = model.extents * scale
         self.body = fcl.CollisionObject(bvh, fcl.Transform(rotation.as_matrix(), np.zeros(3)))
 

@@ -14,13 +14,12 @@ Elberink 2012 (depth steps that grow with the square of the distance).
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-from scipy.spatial.transform import Rotation
-
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.synthesis import sensor_kernels
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True)

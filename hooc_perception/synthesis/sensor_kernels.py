@@ -128,6 +128,7 @@ def time_of_flight(depth, ids, cosine, drift, ripple, reflectance, glass, shift,
     """Return (depth float32 with NaN, ids int32) of a Kinect v2; arguments as in `sense`."""
     h, w = depth.shape
     n = reflectance.shape[0] - 1
+    dark = 1.0 + 0.3 * (1.0 / np.sqrt(reflectance) - 1.0)
     out = np.full((h, w), np.nan, np.float32)
     seen = ids.copy()
     for v in range(h):
@@ -148,15 +149,14 @@ def time_of_flight(depth, ids, cosine, drift, ripple, reflectance, glass, shift,
             # Light falls with the square of the distance and towards the image's corners.
             eccentric = ((u - 0.5 * w) ** 2 + (v - 0.5 * h) ** 2) / (fx * fx)
             signal = reflectance[which] * cos / (z * z * (1.0 + eccentric))
-            if chance < random_dropout + math.exp(-signal / max(signal_floor, 1e-9)) * (
-                    1.0 - random_dropout):
+            if signal < 8.0 * signal_floor and chance < random_dropout + math.exp(
+                    -signal / signal_floor) * (1.0 - random_dropout):
                 continue
             theta = math.acos(min(cos, 1.0))
             # Fankhauser et al. 2015, millimetres for z in metres.
-            sigma = 1.5 - 0.5 * z + 0.3 * z * z + 0.1 * z ** 1.5 * (
+            sigma = 1.5 - 0.5 * z + 0.3 * z * z + 0.1 * z * math.sqrt(z) * (
                 theta / (0.5 * math.pi - theta + 0.02)) ** 2
-            sigma = 1e-3 * min(sigma, 15.0) * (1.0 + 0.3 * (1.0 / math.sqrt(
-                reflectance[which]) - 1.0)) * (1.0 + 0.8 * eccentric)
+            sigma = 1e-3 * min(sigma, 15.0) * dark[which] * (1.0 + 0.8 * eccentric)
             if glass[which]:
                 if rng.random() < glass_dropout:
                     continue

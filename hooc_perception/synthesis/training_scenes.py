@@ -4,10 +4,6 @@
 
 from dataclasses import dataclass
 
-import joblib
-import numpy as np
-from tqdm import tqdm
-
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.render import render_depth
@@ -17,6 +13,9 @@ from hooc_perception.synthesis.rigs import jittered_rig, random_rig, undistorted
 from hooc_perception.synthesis.room import draw_room, RoomConfig
 from hooc_perception.synthesis.scatter import ScatterConfig, Scatterer
 from hooc_perception.synthesis.sensor import miscalibrated, randomised, sense, SensorConfig
+import joblib
+import numpy as np
+from tqdm import tqdm
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class TrainingConfig(Config):
     calibration_rad: float = param(0.0015, 'Standard deviation of the written rotation of a '
                                    'camera from the true one, each axis.', 'rad', 0.0, 0.2)
     calibration_m: float = param(0.0015, 'The same for its place, each axis.', 'm', 0.0, 0.2)
-    randomise_sensor: bool = param(False, 'Draw the sensor\'s figures anew for every scene.')
+    randomise_sensor: bool = param(False, "Draw the sensor's figures anew for every scene.")
     translucent: float = param(0.0, 'Share of objects that are taken for translucent.', '',
                                0.0, 1.0)
     scatter: ScatterConfig = param(ScatterConfig(), 'How scattered scenes are drawn.')

@@ -21,7 +21,8 @@ from hooc_perception.errors import HoocError
 import numpy as np
 import yaml
 
-MAX_TEXT_BYTES = 8 << 20
+# BOP's scene_gt.json of a thousand images has some ten megabytes.
+MAX_TEXT_BYTES = 64 << 20
 MAX_PNG_BYTES = 64 << 20
 MAX_SIDE = 8192
 _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
@@ -186,9 +187,7 @@ def read_png(path, width, height, bits):
     the readable part of a truncated file without a word.
     """
     data = read_bytes(path, MAX_PNG_BYTES)
-    if data[:8] != b'\x89PNG\r\n\x1a\n' or len(data) < 33:
-        raise HoocError(f'{path}: not a PNG image; save it as a {bits}-bit grey PNG')
-    found_width, found_height, found_bits, kind = struct.unpack('>IIBB', data[16:26])
+    found_width, found_height, found_bits, kind = _png_header(path, data)
     if (found_bits, kind) != (bits, 0):
         raise HoocError(f'{path}: a {found_bits}-bit {_PNG_KINDS.get(kind, "unknown")} PNG; '
                         f'save it as a {bits}-bit grey PNG')
@@ -201,6 +200,11 @@ def read_png(path, width, height, bits):
     if pixels is None or pixels.shape != (height, width):
         raise HoocError(f'{path}: the PNG cannot be decoded; copy or record it again')
     return pixels
+
+
+def png_size(path):
+    """Return (width, height) that a PNG's header says."""
+    return _png_header(path, read_bytes(path, MAX_PNG_BYTES))[:2]
 
 
 def read_depth_png(path, width, height, unit):
@@ -218,6 +222,13 @@ def write_png(path, pixels):
     if not ok:
         raise HoocError(f'{path}: the image of shape {pixels.shape} cannot be made into a PNG')
     Path(path).write_bytes(data.tobytes())
+
+
+def _png_header(path, data):
+    """Return (width, height, bits, kind of colour) of a PNG."""
+    if data[:8] != b'\x89PNG\r\n\x1a\n' or len(data) < 33:
+        raise HoocError(f'{path}: not a PNG image; save it as a grey PNG')
+    return struct.unpack('>IIBB', data[16:26])
 
 
 def _complete(data):

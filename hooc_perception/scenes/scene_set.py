@@ -72,7 +72,7 @@ def load_scene_set(path, with_scenes=True):
     if not path.is_dir():
         raise HoocError(f'{path}: there is no such folder; give a scene set or a BOP dataset')
     if not (path / 'dataset.yaml').is_file() and is_bop(path):
-        name, categories, scenes = load_bop(path)
+        name, categories, scenes = load_bop(path, with_scenes)
         cameras = scenes[0].cameras
         return SceneSet(path, name, 'table', categories, cameras, 0,
                         scenes if with_scenes else ())

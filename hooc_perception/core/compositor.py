@@ -28,10 +28,9 @@ float64, so no drift builds up over millions of flips, `value` equals `evaluate(
 last bit, and equal subsets have equal energies on every machine.
 """
 
-import numpy as np
-
 from hooc_perception.core.kernels import compositor as kernels
 from hooc_perception.errors import HoocError
+import numpy as np
 
 COST_BITS = 22
 

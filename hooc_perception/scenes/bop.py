@@ -10,13 +10,12 @@ without extrinsics is a scene of its own. The table frame is estimated (support_
 
 import re
 
-import numpy as np
-
 from hooc_perception.core.geometry import inverse, pose_from_matrix
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.scenes import camera_files, files
 from hooc_perception.scenes.scene import Category, Scene, TrueObject
+import numpy as np
 
 MM = 0.001
 # Recordings by a moving camera hold hundreds of images; these many, evenly spread, are taken.

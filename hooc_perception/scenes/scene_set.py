@@ -10,13 +10,14 @@ from hooc_perception.errors import HoocError
 from hooc_perception.scenes import camera_files, files
 from hooc_perception.scenes.bop import is_bop, load_bop
 from hooc_perception.scenes.scene import Category, Scene, TrueObject
+from hooc_perception.scenes.writer import FORMAT, NewScene, write_scene_set
 
-FORMAT = 'hooc-scenes/1'
 # Class ids and instance labels travel as 8-bit images in which 0 is the background.
 MAX_CATEGORIES = 255
 MAX_METRES = 1000.0
 
-__all__ = ['Category', 'Scene', 'SceneSet', 'TrueObject', 'load_scene_set']
+__all__ = ['Category', 'NewScene', 'Scene', 'SceneSet', 'TrueObject', 'load_scene_set',
+           'write_scene_set']
 
 
 @dataclass(frozen=True, eq=False)

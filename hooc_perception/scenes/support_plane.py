@@ -5,10 +5,9 @@
 from dataclasses import dataclass
 
 import cv2
-import numpy as np
-
 from hooc_perception.core.geometry import pose_from_matrix, stage_rng, transform
 from hooc_perception.errors import HoocError
+import numpy as np
 
 # Depth is thinned to about this many points a scene; a plane needs no more.
 MAX_POINTS = 40_000

@@ -81,7 +81,7 @@ class Compositor:
         self._offsets = offsets
         self._pixel = (np.cumsum(seen) - 1)[pixel].astype(np.int32)
         self._unary = rounded(unary)
-        self._owner, self._cost, self._slot, self._start = kernels.build(
+        self._owner, self._cost, self._slot, self._start, self._entry = kernels.build(
             offsets, self._pixel, np.ascontiguousarray(depth, np.float32),
             rounded(cost).astype(np.float32), cost_none[used].astype(np.float32))
         self._group = (np.zeros(n, np.int64) if group is None
@@ -139,6 +139,16 @@ class Compositor:
         return self._unseen + self._unary[members].sum() + kernels.evaluate(
             members, self._offsets, self._pixel, self._slot, self._start, self._cost,
             self._nearest)
+
+    def entries_shown(self, mask):
+        """
+        Return (len(self.pixels),) int64: which entry of the lists is seen at each of `pixels`.
+
+        -1 where nothing of the subset `mask` (n,) bool is seen; the current one stays.
+        """
+        kernels.evaluate(np.flatnonzero(mask), self._offsets, self._pixel, self._slot,
+                         self._start, self._cost, self._nearest)
+        return self._entry[self._nearest].astype(np.int64)
 
     def shown(self):
         """Return (len(self.pixels),) int32: the candidate shown at each of `pixels`, or -1."""

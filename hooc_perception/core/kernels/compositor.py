@@ -25,7 +25,7 @@ def build(offsets, pixel, depth, cost, cost_none):
     :param cost: (E,) float32.
     :param cost_none: (P,) float32.
     :return: owner (E + P,) int32, slot_cost (E + P,) float32, slot (E,) int32 of each entry,
-        start (P + 1,) int32 of each pixel's run.
+        start (P + 1,) int32 of each pixel's run, entry (E + P,) int32 of each slot, -1 for none.
     """
     n, n_pixels, n_entries = offsets.shape[0] - 1, cost_none.shape[0], pixel.shape[0]
     start = np.zeros(n_pixels + 1, np.int32)
@@ -35,7 +35,7 @@ def build(offsets, pixel, depth, cost, cost_none):
         start[p + 1] += start[p] + 1
     owner = np.full(n_entries + n_pixels, n, np.int32)
     slot_cost = np.empty(n_entries + n_pixels, np.float32)
-    entry = np.empty(n_entries + n_pixels, np.int32)
+    entry = np.full(n_entries + n_pixels, -1, np.int32)
     slot = np.empty(n_entries, np.int32)
     filled = np.zeros(n_pixels, np.int32)
     for p in range(n_pixels):
@@ -55,7 +55,7 @@ def build(offsets, pixel, depth, cost, cost_none):
         for s in range(start[p], start[p + 1] - 1):
             slot_cost[s] = cost[entry[s]]
             slot[entry[s]] = s
-    return owner, slot_cost, slot, start
+    return owner, slot_cost, slot, start, entry
 
 
 @nb.njit(cache=True)

@@ -1,0 +1,153 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`hooc evaluate`: the paper's tables and the stricter scores."""
+
+import json
+from pathlib import Path
+
+from hooc_perception.errors import HoocError
+
+HELP = ("Score results against the truth of a scene set: the paper's Tables 1-4, stricter scores "
+        "(centre within 2 cm, rotation up to symmetry, BOP's recalls) and, for scenes with "
+        'instance labels but no poses, masks. Several results files stand side by side.')
+
+
+def add_arguments(parser):
+    """Declare the arguments."""
+    parser.add_argument('set', metavar='SET', help='scene set or BOP dataset with the truth')
+    parser.add_argument('results', metavar='RESULTS.json', nargs='*',
+                        help='results of `hooc parse` or `hooc run`; none: Table 1 alone')
+    parser.add_argument('--scene', metavar='ID', action='append', default=[],
+                        help='score this scene only (repeatable)')
+    parser.add_argument('--bop', action='store_true',
+                        help="compute BOP's average recalls of VSD, MSSD and MSPD (slower)")
+    parser.add_argument('--visibility', action='store_true',
+                        help='print Table 1 of every annotated scene in full')
+    parser.add_argument('--model', metavar='MODEL',
+                        help="model folder: adds the truth's energy to Table 4")
+    parser.add_argument('--stages', action='store_true',
+                        help='run the chain of --model again and say what the classifier, the '
+                        'candidates and the parsing lose')
+    parser.add_argument('--baseline', metavar='NAME', choices=('fpfh', 'ppf'),
+                        help='run a baseline first and score it too: fpfh = FPFH features, '
+                        'RANSAC and ICP per category (Open3D); ppf = point pair features (OpenCV)')
+    parser.add_argument('--out', metavar='FILE',
+                        help="where the baseline's results go (default: NAME.json)")
+    parser.add_argument('--seed', type=int, default=0, help='seed of whatever is drawn')
+    parser.add_argument('--json', metavar='FILE', help='write every score as JSON')
+    parser.add_argument('--markdown', metavar='FILE', help='write the tables as Markdown')
+    parser.add_argument('--plots', metavar='DIR', help='write pictures of the scores (PNG)')
+    parser.add_argument('--bop-csv', metavar='FILE',
+                        help="write the (first) results in BOP's CSV format")
+
+
+def run(args):
+    """Run the command; return the exit code."""
+    from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models, table_1
+    from hooc_perception.scenes.results import load_results
+    from hooc_perception.scenes.scene_set import load_scene_set
+
+    if args.stages and not args.model:
+        raise HoocError('--stages runs the chain again and needs a trained model; '
+                        'give its folder with --model')
+    scene_set = load_scene_set(args.set).selected(args.scene)
+    contents = [load_results(path) for path in args.results]
+    labels = _labels(args.results)
+    models = scoring_models(scene_set, args.seed)
+    if args.baseline:
+        path, content = _baseline(args, scene_set, models)
+        labels, contents = [*labels, path.stem], [*contents, content]
+    visibility = table_1(scene_set, models, args.seed)
+    evaluations = [evaluate_results(scene_set, content, models, label,
+                                    visibility if args.bop else None)
+                   for label, content in zip(labels, contents)]
+    truth_energy, stages = {}, {}
+    if args.model:
+        from hooc_perception.evaluation.rerun import rerun
+        truth_energy, stages = rerun(scene_set, args.model, args.stages)
+    tables = _tables(evaluations, scene_set, visibility, truth_energy, stages)
+    if args.visibility or not contents:
+        tables = [*_visibility_tables(visibility), *tables]
+    _write(args, evaluations, contents, tables, scene_set, visibility, truth_energy, stages)
+    return 0
+
+
+def _labels(paths):
+    """Return a short label for each results file, unlike the others'."""
+    paths = [Path(p) for p in paths]
+    stems = [p.stem for p in paths]
+    if len(set(stems)) == len(stems):
+        return stems
+    return [f'{p.parent.name}/{p.stem}' for p in paths]
+
+
+def _baseline(args, scene_set, models):
+    """Run the baseline; return (path, content) of its results."""
+    from hooc_perception.evaluation.baselines import run_baseline
+    from hooc_perception.scenes.results import load_results
+    path = Path(args.out or f'{args.baseline}.json')
+    run_baseline(args.baseline, scene_set, models, path, args.seed)
+    return path, load_results(path)
+
+
+def _tables(evaluations, scene_set, visibility, truth_energy, stages):
+    """Return every table that the inputs give."""
+    from hooc_perception.evaluation import paper_tables
+
+    tables = [paper_tables.visibility_summary(visibility)] if visibility else []
+    tables += [paper_tables.score_table(evaluations, setting) for setting in 'AB']
+    if any(e.scores for e in evaluations):
+        tables.append(paper_tables.paper_scores())
+        tables.append(paper_tables.energy_table(evaluations, truth_energy))
+        tables.append(paper_tables.strict_table(evaluations))
+    for e in evaluations:
+        if e.scores:
+            tables.append(paper_tables.category_table(e, scene_set.category_names))
+        tables.append(paper_tables.mask_table(e))
+    if stages:
+        tables.append(paper_tables.stage_table(stages))
+    return [table for table in tables if table]
+
+
+def _visibility_tables(visibility):
+    """Return Table 1 of every scene and the paper's own."""
+    from hooc_perception.evaluation import paper_tables
+    if not visibility:
+        return []
+    return [*(paper_tables.visibility_table(name, rows) for name, rows in visibility.items()),
+            paper_tables.paper_visibility()]
+
+
+def _write(args, evaluations, contents, tables, scene_set, visibility, truth_energy, stages):
+    """Print the tables and write whatever files were asked for."""
+    from hooc_perception.evaluation.tables import to_markdown, to_text
+
+    if not tables:
+        raise HoocError(f'{args.set}: no scene has true poses or instance labels; there is '
+                        'nothing to score against')
+    print('\n\n'.join(to_text(table) for table in tables))
+    if args.markdown:
+        full = _visibility_tables(visibility)
+        full = [*(table for table in tables if table not in full), *full]
+        _file(args.markdown).write_text('\n'.join(to_markdown(table) for table in full))
+    if args.json:
+        from hooc_perception.evaluation.as_json import as_json
+        content = as_json(scene_set, evaluations, visibility, truth_energy, stages)
+        _file(args.json).write_text(json.dumps(content, indent=1, allow_nan=False) + '\n')
+    if args.plots:
+        from hooc_perception.evaluation.plots import write_plots
+        names = scene_set.category_names
+        write_plots(args.plots, [(e.label, e.scores, e.per_category(names))
+                                 for e in evaluations if e.scores], names)
+    if args.bop_csv:
+        if not contents:
+            raise HoocError('--bop-csv needs a results file to write; name one')
+        from hooc_perception.evaluation.bop_csv import write_bop_csv
+        write_bop_csv(args.bop_csv, contents[0], scene_set)
+
+
+def _file(path):
+    """Return the path, its folder made."""
+    path = Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    return path

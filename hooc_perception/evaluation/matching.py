@@ -1,0 +1,65 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which estimate stands for which true object: one to one within a category."""
+
+from dataclasses import dataclass
+
+from hooc_perception.errors import HoocError
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+
+@dataclass(frozen=True)
+class PosedObject:
+    """
+    An object of a category at a pose and a size.
+
+    :ivar translation: (3,) centre of the bounding box, world, metres.
+    :ivar rotation_xyzw: (4,) unit quaternion, model axes to world.
+    :ivar size: (3,) extents along the model axes, metres.
+    :ivar score: of an estimate; 1 for a true object.
+    """
+
+    category: str
+    translation: np.ndarray
+    rotation_xyzw: np.ndarray
+    size: np.ndarray
+    score: float = 1.0
+
+
+def posed(thing):
+    """Return a PosedObject of a results entry (a mapping) or of a TrueObject."""
+    get = thing.get if isinstance(thing, dict) else lambda k, d=None: getattr(thing, k, d)
+    try:
+        rotation = np.asarray(get('rotation_xyzw'), np.float64).reshape(4)
+        return PosedObject(str(get('category')),
+                           np.asarray(get('translation'), np.float64).reshape(3),
+                           rotation / np.linalg.norm(rotation),
+                           np.asarray(get('size'), np.float64).reshape(3),
+                           1.0 if get('score') is None else float(get('score')))
+    except (TypeError, ValueError) as error:
+        raise HoocError(f'object {get("category")!r} has no usable pose: {error}; give '
+                        'translation (3), rotation_xyzw (4) and size (3)') from None
+
+
+def match_by_centre(estimates, truths):
+    """
+    Return [(i_est, i_true, metres)], one to one within each category.
+
+    The Hungarian method on the distance between centres, as many pairs as the category allows;
+    the distance does not limit the pairing, so that errors of badly placed objects show.
+
+    :param estimates: sequence of PosedObject, as `truths`.
+    """
+    pairs = []
+    for category in dict.fromkeys(t.category for t in truths):
+        i_est = [i for i, e in enumerate(estimates) if e.category == category]
+        i_true = [i for i, t in enumerate(truths) if t.category == category]
+        if not i_est:
+            continue
+        distance = np.array([[np.linalg.norm(np.subtract(truths[t].translation,
+                                                         estimates[e].translation))
+                              for e in i_est] for t in i_true])
+        for row, column in zip(*linear_sum_assignment(distance)):
+            pairs.append((i_est[column], i_true[row], float(distance[row, column])))
+    return pairs

@@ -1,0 +1,141 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The paper's scores of a scene (section 6) and stricter ones."""
+
+from dataclasses import dataclass
+
+from hooc_perception.core.geometry import matrix_from_pose
+from hooc_perception.evaluation.matching import match_by_centre
+from hooc_perception.evaluation.symmetry import rotation_error
+import numpy as np
+
+TIGHT_M = 0.02
+
+
+@dataclass(frozen=True)
+class ObjectScore:
+    """
+    One true object and what stands for it.
+
+    :ivar estimate: index of the estimate of its category, None where there is none.
+    :ivar centre_m: distance between the centres; NaN without an estimate, as the next.
+    :ivar rotation_rad: least angle over the model's symmetries.
+    :ivar size_ratio: estimated over true length of the bounding box's diagonal.
+    """
+
+    category: str
+    truth: int
+    estimate: int | None
+    localized: bool = False
+    centre_m: float = float('nan')
+    rotation_rad: float = float('nan')
+    size_ratio: float = float('nan')
+
+    @property
+    def tight(self):
+        """Return whether the centre is within 2 cm."""
+        return self.centre_m < TIGHT_M
+
+
+@dataclass(frozen=True)
+class SceneScore:
+    """
+    The scores of one scene.
+
+    :ivar found, localized, tight: shares of the true objects: of a found category; centre
+        within half the generic model's longest side; centre within 2 cm. NaN without truth.
+    :ivar false_categories: number of estimated categories that are not in the scene.
+    :ivar estimated: number of estimated objects.
+    :ivar seconds: as the results say; NaN where they do not.
+    :ivar missing: True where the results do not hold this scene: it counts as empty.
+    """
+
+    name: str
+    found: float
+    localized: float
+    tight: float
+    false_categories: int
+    estimated: int
+    seconds: float
+    objects: tuple
+    missing: bool = False
+
+
+def score_objects(estimates, truths, models):
+    """
+    Return [ObjectScore] in the order of `truths`.
+
+    :param models: mapping category name -> GenericModel; its longest side is the size of
+        METHOD.md's criterion.
+    """
+    matched = {true: (est, metres) for est, true, metres in match_by_centre(estimates, truths)}
+    out = []
+    for index, truth in enumerate(truths):
+        if index not in matched:
+            out.append(ObjectScore(truth.category, index, None))
+            continue
+        i_est, metres = matched[index]
+        estimate, model = estimates[i_est], models[truth.category]
+        R_est, R_true = (matrix_from_pose(p.translation, p.rotation_xyzw)[:3, :3]
+                         for p in (estimate, truth))
+        out.append(ObjectScore(
+            truth.category, index, i_est, metres < 0.5 * model.longest_side, metres,
+            rotation_error(R_est, R_true, model.symmetry),
+            float(np.linalg.norm(estimate.size) / np.linalg.norm(truth.size))))
+    return out
+
+
+def score_scene(name, estimates, truths, models, seconds=float('nan'), missing=False):
+    """Return the SceneScore of estimates against truths (sequences of PosedObject)."""
+    objects = score_objects(estimates, truths, models)
+    n = len(truths) or float('nan')
+    return SceneScore(
+        name, sum(o.estimate is not None for o in objects) / n,
+        sum(o.localized for o in objects) / n, sum(o.tight for o in objects) / n,
+        len({e.category for e in estimates} - {t.category for t in truths}),
+        len(estimates), float(seconds), tuple(objects), missing)
+
+
+def means(scores):
+    """Return {field: mean over scenes} of the numeric fields; NaN entries are left out."""
+    out = {}
+    for name in ('found', 'localized', 'tight', 'false_categories', 'estimated', 'seconds'):
+        values = np.array([getattr(s, name) for s in scores], np.float64)
+        values = values[np.isfinite(values)]
+        out[name] = float(values.mean()) if len(values) else float('nan')
+    return out
+
+
+def pose_errors(scores):
+    """
+    Return {centre_m, rotation_rad, size_ratio}: float64 arrays over all matched objects.
+
+    Objects whose category was not found have no error and are left out.
+    """
+    objects = [o for s in scores for o in s.objects if o.estimate is not None]
+    return {name: np.array([getattr(o, name) for o in objects], np.float64)
+            for name in ('centre_m', 'rotation_rad', 'size_ratio')}
+
+
+def per_category(scores, estimates_by_scene, categories):
+    """
+    Return {category: dict} of counts and median errors.
+
+    The counts are true, estimated, found, localized, tight; centre_m and rotation_rad are
+    medians over the localized objects, None where there are none.
+
+    :param estimates_by_scene: sequence of sequences of PosedObject, in the order of `scores`.
+    """
+    out = {}
+    for category in categories:
+        objects = [o for s in scores for o in s.objects if o.category == category]
+        placed = [o for o in objects if o.localized]
+        out[category] = {
+            'true': len(objects),
+            'estimated': sum(e.category == category for es in estimates_by_scene for e in es),
+            'found': sum(o.estimate is not None for o in objects),
+            'localized': len(placed), 'tight': sum(o.tight for o in objects),
+            'centre_m': float(np.median([o.centre_m for o in placed])) if placed else None,
+            'rotation_rad': (float(np.median([o.rotation_rad for o in placed]))
+                             if placed else None)}
+    return out

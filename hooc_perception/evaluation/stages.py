@@ -1,0 +1,139 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""What each stage loses: the classifier's pixels, the pool's poses, the search's choice."""
+
+from dataclasses import dataclass
+
+from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import Candidates
+from hooc_perception.evaluation.errors import world_mesh
+from hooc_perception.evaluation.matching import PosedObject
+from hooc_perception.evaluation.scores import TIGHT_M
+import numpy as np
+from sklearn.metrics import log_loss
+
+# A true object's generic model and the reading may differ this much: rough models.
+AGREE_M = 0.03
+
+
+def class_ids(models):
+    """Return {category name: class id} of a sequence of GenericModel."""
+    return {model.name: i + 1 for i, model in enumerate(models)}
+
+
+def as_candidates(objects, models):
+    """Return PosedObjects as Candidates; categories without a model are left out."""
+    ids = class_ids(models)
+    kept = [o for o in objects if o.category in ids]
+    if not kept:
+        return Candidates.empty()
+    return Candidates(np.array([ids[o.category] for o in kept], np.uint16),
+                      np.array([o.translation for o in kept], np.float64),
+                      np.array([o.rotation_xyzw for o in kept], np.float64),
+                      np.array([o.size for o in kept], np.float32),
+                      np.array([o.score for o in kept], np.float32))
+
+
+def as_objects(candidates, models):
+    """Return Candidates as a list of PosedObject."""
+    return [PosedObject(models[int(c) - 1].name, candidates.translation[i],
+                        candidates.rotation_xyzw[i], candidates.size[i].astype(np.float64),
+                        float(candidates.score[i]))
+            for i, c in enumerate(candidates.category)]
+
+
+def true_classes(truths, models, view):
+    """
+    Return (H, W) int32: the class of the true object seen at a pixel, 0 none, -1 not certain.
+
+    Certain are foreground pixels where the posed generic model agrees with the reading within
+    AGREE_M, and pixels that show no object and are no foreground.
+
+    :param truths: sequence of PosedObject.
+    :param models: sequence of GenericModel, class id c is models[c - 1].
+    :param view: ObservedView.
+    """
+    ids = class_ids(models)
+    kept = [t for t in truths if t.category in ids]
+    depth, shown = render_depth([world_mesh(t, models[ids[t.category] - 1]) for t in kept],
+                                view.camera)
+    lookup = np.array([ids[t.category] for t in kept] + [0], np.int32)
+    classes = lookup[shown]
+    with np.errstate(invalid='ignore'):
+        agrees = np.abs(depth - view.depth) < AGREE_M
+    classes[(shown >= 0) & ~(agrees & view.foreground)] = -1
+    classes[(shown < 0) & view.foreground] = -1
+    return classes
+
+
+def pixel_scores(probabilities, observation, truths, models):
+    """
+    Return the classifier's scores over all certain foreground pixels of a scene.
+
+    :return: {pixels, accuracy, balanced_accuracy, true_probability, log_loss}: share of pixels
+        whose most likely class is the true one; the same averaged over classes; mean
+        probability of the true class; mean -log of it.
+    """
+    truth = np.stack([true_classes(truths, models, v) for v in observation.views])
+    u, v = probabilities.uv[:, 0].astype(int), probabilities.uv[:, 1].astype(int)
+    true = truth[probabilities.camera.astype(int), v, u]
+    certain = true > 0
+    if not certain.any():
+        return {'pixels': 0, 'accuracy': float('nan'), 'balanced_accuracy': float('nan'),
+                'true_probability': float('nan'), 'log_loss': float('nan')}
+    true, p = true[certain], probabilities.p[certain].astype(np.float64)
+    p = (p + 0.5) / (p + 0.5).sum(1, keepdims=True)
+    likely = p.argmax(1)
+    labels = np.arange(p.shape[1])
+    correct = likely == true
+    balanced = np.mean([correct[true == c].mean() for c in np.unique(true)])
+    return {'pixels': int(certain.sum()), 'accuracy': float(correct.mean()),
+            'balanced_accuracy': float(balanced),
+            'true_probability': float(p[np.arange(len(true)), true].mean()),
+            'log_loss': float(log_loss(true, p, labels=labels))}
+
+
+@dataclass(frozen=True)
+class StageLoss:
+    """
+    Where the true objects of a scene were lost, as shares of them.
+
+    :ivar pool_localized: some candidate of the category lies within half the model's size.
+    :ivar pool_tight: some candidate of the category lies within 2 cm.
+    :ivar first_localized: the best-scored candidate of the category lies within half the size.
+    :ivar kept: of the objects with a localized candidate, those localized in the answer.
+    :ivar candidates: number of candidates.
+    """
+
+    pool_localized: float
+    pool_tight: float
+    first_localized: float
+    kept: float
+    candidates: int
+
+
+def pool_recall(pool, truths, models, score=None):
+    """
+    Return the StageLoss of a pool of Candidates.
+
+    :param truths: sequence of PosedObject.
+    :param models: sequence of GenericModel.
+    :param score: SceneScore of the answer, for `kept`; NaN without one.
+    """
+    ids = class_ids(models)
+    near, tight, first = (np.zeros(len(truths), bool) for _ in range(3))
+    for i, truth in enumerate(truths):
+        rows = np.flatnonzero(pool.category == ids.get(truth.category, 0))
+        if not len(rows):
+            continue
+        distance = np.linalg.norm(pool.translation[rows] - truth.translation, axis=1)
+        limit = 0.5 * models[ids[truth.category] - 1].longest_side
+        near[i], tight[i] = (distance < limit).any(), (distance < TIGHT_M).any()
+        first[i] = distance[np.argmax(pool.score[rows])] < limit
+    kept = float('nan')
+    if score is not None and near.any():
+        localized = np.zeros(len(truths), bool)
+        localized[[o.truth for o in score.objects if o.localized]] = True
+        kept = float(localized[near].mean())
+    n = max(len(truths), 1)
+    return StageLoss(near.sum() / n, tight.sum() / n, first.sum() / n, kept, len(pool))

@@ -1,0 +1,37 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+
+HOOC := .venv/bin/hooc
+PYTEST_ARGS ?=
+
+.PHONY: help setup demo test bundle lint lock clean
+
+help:
+	@echo 'make demo    set up if need be, then find the objects of the bundled scene'
+	@echo 'make test    set up if need be, then run every test (PYTEST_ARGS="-k name" for some)'
+	@echo 'make setup   only set up'
+	@echo 'make bundle  make the bundled scene and model again'
+	@echo 'make lint    check the style'
+	@echo 'make lock    resolve requirements.in again (PYTHONS="python3.11 python3.12")'
+
+setup:
+	@bash scripts/setup.sh
+
+demo: setup
+	@$(HOOC) demo
+
+test: setup
+	@.venv/bin/python -m pytest $(PYTEST_ARGS)
+
+bundle: setup
+	@$(HOOC) demo --make-bundle
+
+lint: setup
+	@.venv/bin/ruff check .
+
+lock:
+	@.venv/bin/python scripts/lock.py $(PYTHONS)
+
+clean:
+	rm -rf build install log out .pytest_cache .ruff_cache
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +

@@ -2,13 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Derive everything that the chain needs to know about a category from its mesh, once."""
 
-import numpy as np
-import trimesh
-
 from hooc_perception.core.types import GenericModel
 from hooc_perception.models.repair import closed
 from hooc_perception.models.rest import resting_poses
 from hooc_perception.models.symmetry import axis_symmetry
+import numpy as np
+import trimesh
 
 SURFACE_POINTS = 2048
 INTERIOR_POINTS = 512

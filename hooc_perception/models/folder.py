@@ -22,11 +22,10 @@ import shutil
 import tempfile
 import zipfile
 
-import numpy as np
-import trimesh
-
 from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
+import numpy as np
+import trimesh
 
 FORMAT = 'hooc-model/1'
 MAX_JSON_BYTES = 4 * 10**6

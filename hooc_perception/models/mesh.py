@@ -6,11 +6,10 @@ import io
 import math
 from pathlib import Path
 
-import numpy as np
-import trimesh
-
 from hooc_perception.errors import HoocError
 from hooc_perception.models.repair import closed
+import numpy as np
+import trimesh
 
 __all__ = ['closed', 'load_mesh']
 

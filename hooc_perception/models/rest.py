@@ -2,11 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stable resting poses of a model, one for each way of lying that looks different."""
 
+from hooc_perception.models.symmetry import equivalent_directions, is_ball
 import numpy as np
 from scipy.spatial.transform import Rotation
 import trimesh
-
-from hooc_perception.models.symmetry import equivalent_directions, is_ball
 
 MAX_POSES = 12
 # Poses whose up directions differ by less than this are one way of lying (facets of a bend).

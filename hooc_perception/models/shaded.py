@@ -1,0 +1,164 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Shaded pictures of meshes, for reports and documentation only.
+
+pyrender draws them off screen by EGL or OSMesa, whichever is installed; where neither is, the
+chain's own depth renderer does, with the light computed from the depth.
+"""
+
+import atexit
+import ctypes.util
+from dataclasses import dataclass
+import functools
+import logging
+import os
+
+from hooc_perception.core.geometry import back_project
+from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import Camera
+import numpy as np
+import trimesh
+
+log = logging.getLogger(__name__)
+
+GREY = (178, 184, 192)
+SMOOTH_BELOW_DEG = 40.0
+# The numpy fallback draws this many times larger and averages.
+OVERSAMPLE = 2
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """
+    A view that circles the meshes and fits them into the picture.
+
+    :ivar azimuth_deg: where the viewer stands, from x towards y.
+    :ivar elevation_deg: how far above the horizontal.
+    :ivar margin: 1.0 fits the bounding sphere; smaller comes closer.
+    """
+
+    azimuth_deg: float = -55.0
+    elevation_deg: float = 35.0
+    margin: float = 0.9
+
+    def camera(self, vertices, size):
+        """Return the Camera that sees all vertices (V, 3) in a picture of size (width, height)."""
+        width, height = size
+        low, high = np.min(vertices, axis=0), np.max(vertices, axis=0)
+        middle, radius = (low + high) / 2, max(np.linalg.norm(high - low) / 2, 1e-6)
+        focal = 2.2 * min(width, height)
+        distance = self.margin * radius * focal / (min(width, height) / 2) + radius
+        a, e = np.radians(self.azimuth_deg), np.radians(self.elevation_deg)
+        back = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
+        right = np.array([-np.sin(a), np.cos(a), 0.0])
+        T_world_camera = np.eye(4)
+        T_world_camera[:3, :3] = np.column_stack([right, np.cross(-back, right), -back])
+        T_world_camera[:3, 3] = middle + distance * back
+        K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1.0]])
+        return Camera('orbit', width, height, K, np.zeros(5), T_world_camera)
+
+
+def render_shaded(meshes, view=None, size=(320, 240), colours=None, background=(255, 255, 255)):
+    """
+    Return a shaded picture (H, W, 3) uint8 of posed meshes.
+
+    :param meshes: sequence of trimesh.Trimesh or (vertices (V, 3) world metres, faces (F, 3)).
+    :param view: a rectified Camera, whose own size then counts, or an Orbit.
+    :param size: (width, height) in pixels, for an Orbit.
+    :param colours: one (r, g, b) 0..255 per mesh; grey where absent.
+    """
+    pairs = [(np.asarray(m.vertices, np.float64), np.asarray(m.faces, np.int32))
+             if hasattr(m, 'faces') else m for m in meshes]
+    colours = [GREY] * len(pairs) if colours is None else list(colours)
+    if not isinstance(view, Camera):
+        view = (view or Orbit()).camera(
+            np.vstack([v for v, _ in pairs] or [np.zeros((1, 3))]), size)
+    if _pyrender() is not None:
+        try:
+            return _by_pyrender(pairs, view, colours, background)
+        except Exception as e:  # a driver may fail in any way; the picture is still wanted
+            log.warning('pyrender failed (%s); shading with numpy instead', e)
+            _pyrender.cache_clear()
+            os.environ['HOOC_NO_GL'] = '1'
+    return _by_numpy(pairs, view, colours, background)
+
+
+@functools.lru_cache(maxsize=1)
+def _pyrender():
+    """Return the module pyrender with a platform that is installed, or None."""
+    if os.environ.get('HOOC_NO_GL'):
+        return None
+    if 'PYOPENGL_PLATFORM' not in os.environ:
+        found = [name for name, library in (('egl', 'EGL'), ('osmesa', 'OSMesa'))
+                 if ctypes.util.find_library(library)]
+        if not found:
+            return None
+        os.environ['PYOPENGL_PLATFORM'] = found[0]
+    # pyrender 0.1.45 still says np.infty, which numpy 2 has dropped.
+    if not hasattr(np, 'infty'):
+        np.infty = np.inf
+    try:
+        import pyrender
+    except Exception as e:
+        log.warning('pyrender cannot be used (%s); shading with numpy instead', e)
+        return None
+    return pyrender
+
+
+@functools.lru_cache(maxsize=1)
+def _renderer():
+    """Return the one off-screen renderer; its size is set before each use."""
+    renderer = _pyrender().OffscreenRenderer(64, 64)
+    atexit.register(renderer.delete)
+    return renderer
+
+
+def _by_pyrender(pairs, camera, colours, background):
+    """Draw by OpenGL."""
+    pyrender = _pyrender()
+    scene = pyrender.Scene(bg_color=[*np.divide(background, 255.0), 1.0],
+                           ambient_light=[0.32, 0.32, 0.32])
+    for (vertices, faces), colour in zip(pairs, colours):
+        mesh = trimesh.graph.smooth_shade(trimesh.Trimesh(vertices, faces, process=False),
+                                          angle=np.radians(SMOOTH_BELOW_DEG), facet_minarea=None)
+        material = pyrender.MetallicRoughnessMaterial(
+            baseColorFactor=[*np.divide(colour, 255.0), 1.0], metallicFactor=0.0,
+            roughnessFactor=0.8, doubleSided=True)
+        scene.add(pyrender.Mesh.from_trimesh(mesh, material=material, smooth=True))
+    # OpenGL looks along -z with y up, and its pixel centres lie at halves.
+    T_world_gl = camera.T_world_camera @ np.diag([1.0, -1.0, -1.0, 1.0])
+    K = camera.K
+    scene.add(pyrender.IntrinsicsCamera(K[0, 0], K[1, 1], K[0, 2] + 0.5, K[1, 2] + 0.5,
+                                        znear=0.02, zfar=50.0), pose=T_world_gl)
+    key = np.eye(4)
+    key[:3, :3] = T_world_gl[:3, :3] @ trimesh.transformations.euler_matrix(-0.7, -0.6, 0)[:3, :3]
+    scene.add(pyrender.DirectionalLight(intensity=3.0), pose=key)
+    scene.add(pyrender.DirectionalLight(intensity=1.2), pose=T_world_gl)
+    renderer = _renderer()
+    renderer.viewport_width, renderer.viewport_height = camera.width, camera.height
+    return np.array(renderer.render(scene)[0], np.uint8)
+
+
+def _by_numpy(pairs, camera, colours, background):
+    """Draw with the depth renderer; the light follows from the slope of the depth."""
+    n = OVERSAMPLE
+    K = camera.K * n
+    K[:2, 2] += (n - 1) / 2
+    K[2, 2] = 1.0
+    large = Camera(camera.name, camera.width * n, camera.height * n, K, np.zeros(5),
+                   camera.T_world_camera)
+    depth, ids = render_depth(pairs, large)
+    points = back_project(np.where(np.isfinite(depth), depth, np.nan), large)
+    normal = np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0))
+    # Next to nothing there is no slope; such a pixel faces the viewer.
+    back = -camera.T_world_camera[:3, 2]
+    normal = np.where(np.isfinite(normal).all(-1, keepdims=True), normal, back)
+    normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    T = camera.T_world_camera
+    key = T[:3, :3] @ np.array([-0.50, -0.60, -0.62])
+    light = 0.35 + 0.45 * np.abs(normal @ key) + 0.25 * np.abs(normal @ back)
+    picture = np.array([*colours, background], np.float64)[ids]
+    picture = np.where(ids[..., None] >= 0, picture * light[..., None], picture)
+    small = picture.reshape(camera.height, n, camera.width, n, 3).mean(axis=(1, 3))
+    return np.clip(small, 0, 255).astype(np.uint8)

@@ -1,0 +1,141 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Turn a generic model into a thing that somebody might own: same kind, other proportions.
+
+Section 7 of Basevi & Leonardis 2016 names the mismatch between generic and real shapes as a
+limit, and perturbed training geometry as a remedy. A `Warp` moves points, so the same one
+serves a mesh and the convex pieces that physics uses for it. Moving vertices never opens a
+closed mesh.
+"""
+
+from dataclasses import dataclass, replace
+
+from hooc_perception.core.geometry import matrix_from_pose, transform
+import numpy as np
+from scipy.spatial.transform import Rotation
+import trimesh
+
+# Two cups of one kind differ by about this much, as logarithms of their sides: overall, and
+# each side on its own. Household ware of one category comes in sizes 1 : 1.5 or so.
+SIZE_SPREAD = 0.12
+ASPECT_SPREAD = 0.12
+TAPER_SPREAD = 0.08
+BEND_SPREAD = 0.012
+LATTICE_SPREAD = 0.035
+
+
+@dataclass(frozen=True)
+class Warp:
+    """
+    A smooth map of model space.
+
+    :ivar low: (3,) lower corner of the box it was drawn for; `extents` (3,) its sides, metres.
+    :ivar scale: (3,) factor along each axis.
+    :ivar axis: the axis along which taper and bend act.
+    :ivar taper: (3,) relative growth of each axis from one end of `axis` to the other.
+    :ivar bend: (3,) shift of both ends over the middle, metres.
+    :ivar lattice: (4, 4, 4, 3) shifts of the control points, metres (free-form deformation
+        after Sederberg & Parry 1986).
+    :ivar offset: (3,) what is subtracted at last.
+    """
+
+    low: np.ndarray
+    extents: np.ndarray
+    scale: np.ndarray
+    axis: int
+    taper: np.ndarray
+    bend: np.ndarray
+    lattice: np.ndarray
+    offset: np.ndarray
+
+    def __call__(self, points):
+        """Return points (n, 3) float64 of model space, moved."""
+        middle = self.low + 0.5 * self.extents
+        unit = (points - self.low) / self.extents
+        shift = np.zeros(points.shape)
+        w = [_bernstein(unit[:, k]) for k in range(3)]
+        for i in range(4):
+            for j in range(4):
+                shift += (w[0][:, i] * w[1][:, j])[:, None] * (w[2] @ self.lattice[i, j])
+        along = 2 * unit[:, self.axis] - 1
+        moved = (points - middle + shift) * (1 + 0.5 * along[:, None] * self.taper)
+        moved = moved + (along ** 2 - 0.5)[:, None] * self.bend
+        return moved * self.scale + middle - self.offset
+
+
+def random_warp(vertices, rng, strength=1.0, symmetry=None):
+    """
+    Return a Warp that puts the bounding-box centre of the moved `vertices` (V, 3) at 0.
+
+    :param strength: 0 = none, 1 = as much as real objects differ.
+    :param symmetry: (3,) axis orders as in GenericModel, or None. What is turned on a lathe
+        stays round: the two axes across share their scale, and little else is bent.
+    """
+    low = vertices.min(axis=0)
+    # Sheets have a side of length 0; a millimetre keeps the unit cube well defined.
+    extents = np.maximum(vertices.max(axis=0) - low, 1e-3)
+    aspect = _clipped(rng, 3) * ASPECT_SPREAD
+    round_axes = [] if symmetry is None else [k for k in range(3) if symmetry[k] == 0]
+    if len(round_axes) == 1:
+        across = [k for k in range(3) if k != round_axes[0]]
+        aspect[across] = aspect[across[0]]
+    elif round_axes:
+        aspect[:] = aspect[0]
+    scale = np.exp(strength * (SIZE_SPREAD * _clipped(rng, 1) + aspect))
+    axis = int(np.argmax(extents))
+    taper = np.full(3, TAPER_SPREAD * strength) * _clipped(rng, 3)
+    taper[axis] = 0.0
+    bend = BEND_SPREAD * strength * extents[axis] * _clipped(rng, 3)
+    bend[axis] = 0.0
+    reach = 0.6 * extents + 0.1 * extents.max()
+    lattice = LATTICE_SPREAD * strength * reach * _clipped(rng, (4, 4, 4, 3))
+    if round_axes:
+        taper *= 0.5 * (len(round_axes) == 1)
+        if len(round_axes) == 1:
+            taper[:] = taper.max() * (np.arange(3) != axis)
+        bend, lattice = 0.2 * bend, 0.25 * lattice
+    warp = Warp(low, extents, scale, axis, taper, bend, lattice, np.zeros(3))
+    moved = warp(vertices)
+    return replace(warp, offset=0.5 * (moved.min(axis=0) + moved.max(axis=0)))
+
+
+def reshape(vertices, faces, rng, strength=1.0, symmetry=None, detail_loss=0.3):
+    """
+    Return (vertices (V, 3) centred, extents (3,), Warp) of a random relative of a mesh.
+
+    :param vertices: (V, 3) float64 in model axes, metres; `faces` (F, 3) stay valid.
+    :param detail_loss: chance that fine detail is smoothed away, for meshes that have any.
+    """
+    warp = random_warp(vertices, rng, strength, symmetry)
+    moved = warp(np.asarray(vertices, np.float64))
+    if strength > 0 and rng.random() < detail_loss and len(faces) > 600:
+        mesh = trimesh.Trimesh(moved, faces, process=False)
+        # Taubin 1995: smooths without shrinking.
+        trimesh.smoothing.filter_taubin(mesh, lamb=0.5, nu=0.53, iterations=6)
+        moved = np.array(mesh.vertices)
+        moved -= 0.5 * (moved.min(axis=0) + moved.max(axis=0))
+    return moved, moved.max(axis=0) - moved.min(axis=0), warp
+
+
+def reshape_placed(placed, rng, strength, symmetry=None):
+    """Return the PlacedObject reshaped where it stands, its lowest point at the old height."""
+    R = Rotation.from_quat(placed.rotation_xyzw).as_matrix()
+    in_model = (placed.vertices_world - placed.translation) @ R
+    moved, size, _ = reshape(in_model, placed.faces, rng, strength, symmetry)
+    lowest = placed.vertices_world[:, 2].min()
+    translation = placed.translation.copy()
+    translation[2] += lowest - (moved @ R.T + translation)[:, 2].min()
+    world = transform(matrix_from_pose(translation, placed.rotation_xyzw), moved)
+    return replace(placed, translation=translation, size=size, vertices_world=world)
+
+
+def _clipped(rng, shape):
+    """Return normal draws held within 2.2 standard deviations: no freaks."""
+    return np.clip(rng.standard_normal(shape), -2.2, 2.2)
+
+
+def _bernstein(t):
+    """Return (n, 4) cubic Bernstein weights."""
+    s = 1 - t
+    return np.stack([s ** 3, 3 * t * s ** 2, 3 * t ** 2 * s, t ** 3], axis=1)

@@ -1,0 +1,235 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Let objects come to rest on the table by physics (MuJoCo): stacked, leaning, in any pose."""
+
+from collections import OrderedDict
+from dataclasses import dataclass
+
+from hooc_perception.core.config import Config, param
+from hooc_perception.core.geometry import matrix_from_pose, transform
+from hooc_perception.errors import HoocError
+from hooc_perception.models.mesh import closed
+from hooc_perception.synthesis.convex import convex_pieces
+from hooc_perception.synthesis.reshape import reshape
+from hooc_perception.synthesis.scatter import PlacedObject
+import mujoco
+import numpy as np
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+# Household ware weighs about this much a litre of its own volume (plastic, wood, ceramics).
+DENSITY = 700.0
+STEP_S = 0.004
+
+
+@dataclass(frozen=True)
+class SettleConfig(Config):
+    """How objects are laid down before physics takes over."""
+
+    upright: float = param(0.45, 'Share of objects set down in a stable resting pose of their '
+                           'model, as a hand would; the others are dropped at any angle.', '',
+                           0.0, 1.0)
+    crowding: float = param(0.9, 'Sum of the footprints over the area of the disc that objects '
+                            'are dropped into; over about 0.7, they start to stack.', '',
+                            0.02, 5.0)
+    drop_m: float = param(0.01, 'Height that an object is dropped from, above what lies there.',
+                          'm', 0.0, 0.5)
+    between_s: float = param(0.16, 'Time between two objects.', 's', 0.02, 5.0)
+    rest_s: float = param(1.6, 'Longest time to come to rest after the last one.', 's',
+                          0.1, 30.0)
+    reach_m: float = param(0.5, 'Objects whose centre ends farther from the origin are '
+                           'discarded.', 'm', 0.05, 5.0)
+
+
+@dataclass(frozen=True)
+class Body:
+    """
+    What physics needs of one object.
+
+    :ivar category: class id 1..N; `vertices` (V, 3), `faces` (F, 3): the mesh that is seen,
+        model axes, centred on its bounding box.
+    :ivar pieces: list of (n, 3) convex vertex sets in the same axes.
+    :ivar rest_rotations: (R, 4) xyzw, may be empty.
+    """
+
+    category: int
+    vertices: np.ndarray
+    faces: np.ndarray
+    pieces: list
+    rest_rotations: np.ndarray
+
+
+def settle(bodies, rng, config=SettleConfig()):
+    """
+    Drop the bodies in random order and return the PlacedObject list of what came to rest.
+
+    :param bodies: sequence of Body.
+    :return: those that lie on the table within reach, poses of the bounding-box centres; the
+        order is that of dropping.
+    """
+    if not bodies:
+        return []
+    order = rng.permutation(len(bodies))
+    bodies = [bodies[i] for i in order]
+    model = _compile(bodies)
+    data = mujoco.MjData(model)
+    radius = np.sqrt(sum(ConvexHull(b.vertices[:, np.argsort(np.ptp(b.vertices, axis=0))[1:]]
+                                    ).volume for b in bodies) / (np.pi * config.crowding))
+    released = []
+    for i, body in enumerate(bodies):
+        _release(model, data, bodies, i, released, radius, rng, config)
+        released.append(i)
+        for _ in range(int(config.between_s / STEP_S)):
+            mujoco.mj_step(model, data)
+    quiet = 0
+    for k in range(int(config.rest_s / STEP_S)):
+        mujoco.mj_step(model, data)
+        moving = [i for i in released if data.qpos[7 * i + 2] > -0.05]
+        speed = np.abs(data.qvel.reshape(-1, 6)[moving])
+        quiet = quiet + 1 if not len(moving) or (
+            speed[:, :3].max() < 0.01 and speed[:, 3:].max() < 0.15) else 0
+        if quiet >= 12:
+            break
+    return [placed for i, body in enumerate(bodies)
+            if (placed := _at_rest(model, data, i, body, config)) is not None]
+
+
+def _compile(bodies):
+    """Return the MjModel of a table and the bodies, all parked far below it."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = STEP_S
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    spec.option.iterations = 30
+    common = {'condim': 6, 'friction': [0.7, 0.01, 0.002], 'solref': [0.01, 1.0],
+              'solimp': [0.95, 0.99, 0.001, 0.5, 2]}
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.1], **common)
+    for i, body in enumerate(bodies):
+        node = spec.worldbody.add_body(pos=[3.0 * (i + 1), 0, -50])
+        node.add_freejoint()
+        volumes = np.array([max(ConvexHull(p).volume, 1e-9) for p in body.pieces])
+        mass = np.clip(DENSITY * volumes.sum(), 0.03, 3.0)
+        for k, piece in enumerate(body.pieces):
+            name = f'{i}_{k}'
+            spec.add_mesh(name=name, uservert=np.asarray(piece, np.float64).ravel(),
+                          maxhullvert=32, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
+            node.add_geom(type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name,
+                          mass=mass * volumes[k] / volumes.sum(), contype=0, conaffinity=0,
+                          **common)
+    model = spec.compile()
+    # A little drag on the rotation, as felt and air give: round things come to rest too.
+    drag = model.dof_damping.reshape(-1, 6)
+    mass = model.body_mass[1:, None]
+    drag[:, :3] = 0.3 * mass
+    drag[:, 3:] = 5e-4 * mass
+    return model
+
+
+def _release(model, data, bodies, i, released, radius, rng, config):
+    """Put body i above a random place of the pile, at rest, and let it collide from now on."""
+    body = bodies[i]
+    if rng.random() < config.upright and len(body.rest_rotations):
+        rest = body.rest_rotations[rng.integers(min(len(body.rest_rotations), 3))]
+        rotation = (Rotation.from_rotvec(0.03 * rng.standard_normal(3))
+                    * Rotation.from_euler('z', rng.uniform(-np.pi, np.pi))
+                    * Rotation.from_quat(rest))
+    else:
+        rotation = Rotation.from_quat(rng.standard_normal(4))
+    turned = body.vertices @ rotation.as_matrix().T
+    low, high = turned.min(axis=0), turned.max(axis=0)
+    # A place inside the disc for the whole object where it fits, for its middle otherwise.
+    room = max(radius - 0.25 * np.linalg.norm((high - low)[:2]), 0.3 * radius)
+    angle, r = rng.uniform(0, 2 * np.pi), room * np.sqrt(rng.random())
+    xy = np.array([r * np.cos(angle), r * np.sin(angle)]) - 0.5 * (low + high)[:2]
+    top = 0.0
+    for j in released:
+        other = data.qpos[7 * j:7 * j + 7]
+        points = transform(matrix_from_pose(other[:3], other[[4, 5, 6, 3]]), bodies[j].vertices)
+        under = np.all((points[:, :2] > low[:2] + xy) & (points[:, :2] < high[:2] + xy), axis=1)
+        if _boxes_meet(points, low[:2] + xy, high[:2] + xy):
+            top = max(top, points[under, 2].max() if under.any() else points[:, 2].max())
+    data.qpos[7 * i:7 * i + 3] = [*xy, top - low[2] + config.drop_m]
+    data.qpos[7 * i + 3:7 * i + 7] = rotation.as_quat()[[3, 0, 1, 2]]
+    data.qvel[6 * i:6 * i + 6] = 0.0
+    geoms = model.geom_bodyid == i + 1
+    model.geom_contype[geoms] = 1
+    model.geom_conaffinity[geoms] = 1
+    # MuJoCo's broad phase reads masks of whole bodies that were summed up when it compiled.
+    model.body_contype[i + 1] = 1
+    model.body_conaffinity[i + 1] = 1
+
+
+def _boxes_meet(points, low, high):
+    """Return whether the bounding box of points (n, 3), seen from above, meets a rectangle."""
+    return bool(np.all(points[:, :2].min(axis=0) < high)
+                and np.all(points[:, :2].max(axis=0) > low))
+
+
+def _at_rest(model, data, i, body, config):
+    """Return the PlacedObject of body i, None where it fell off or rolled away."""
+    pose = data.qpos[7 * i:7 * i + 7]
+    if not np.all(np.isfinite(pose)) or pose[2] < -0.01 or np.hypot(*pose[:2]) > config.reach_m:
+        return None
+    quaternion = Rotation.from_quat(pose[[4, 5, 6, 3]]).as_quat(canonical=True)
+    translation = pose[:3].copy()
+    world = transform(matrix_from_pose(translation, quaternion), body.vertices)
+    # Contacts are a little soft: what sank into the table by a hair stands on it.
+    lift = max(0.0, -world[:, 2].min())
+    translation[2] += lift
+    world[:, 2] += lift
+    return PlacedObject(body.category, translation, quaternion,
+                        body.vertices.max(axis=0) - body.vertices.min(axis=0), world, body.faces)
+
+
+class BodyMaker:
+    """Makes bodies of generic models; cuts every mesh into convex pieces only once."""
+
+    def __init__(self, models):
+        """Take a sequence of GenericModel; class id c is models[c - 1]."""
+        self.models = tuple(models)
+        self._pieces = {}
+
+    def pieces(self, index):
+        """Return the cached convex pieces of models[index]."""
+        if index not in self._pieces:
+            import trimesh
+            model = self.models[index]
+            solid = closed(trimesh.Trimesh(model.vertices, model.faces, process=False))
+            self._pieces[index] = convex_pieces(solid)
+        return self._pieces[index]
+
+    def body(self, category, rng, strength=0.0, symmetry=True):
+        """Return a Body of the model with class id `category`, reshaped by `strength`."""
+        model = self.models[category - 1]
+        pieces = self.pieces(category - 1)
+        if strength <= 0:
+            return Body(category, model.vertices, model.faces, pieces, model.rest_rotations)
+        vertices, _, warp = reshape(model.vertices, model.faces, rng, strength,
+                                    model.symmetry if symmetry else None)
+        return Body(category, vertices, model.faces, [warp(p) for p in pieces],
+                    model.rest_rotations)
+
+
+_MAKERS = OrderedDict()
+
+
+def settled_models(models, rng, scatter, strength, config=SettleConfig()):
+    """
+    Return a settled arrangement of a random subset of models, a list of PlacedObject.
+
+    :param scatter: ScatterConfig, gives the range of counts and the repeats.
+    :param strength: how far the objects depart from the generic shapes.
+    :raises HoocError: where there are no models.
+    """
+    if not models:
+        raise HoocError('a settled scene needs at least one model, but there are none')
+    key = tuple((m.name, len(m.vertices), tuple(m.extents)) for m in models)
+    if key not in _MAKERS:
+        while len(_MAKERS) >= 4:
+            _MAKERS.popitem(last=False)
+        _MAKERS[key] = BodyMaker(models)
+    maker = _MAKERS[key]
+    count = int(rng.integers(scatter.objects_low, scatter.objects_high + 1))
+    chosen = rng.permutation(np.tile(np.arange(len(models)), scatter.repeats))[:count] + 1
+    bodies = [maker.body(int(c), rng, strength) for c in chosen]
+    return settle(bodies, rng, config)

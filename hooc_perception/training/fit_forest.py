@@ -1,0 +1,99 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Fitting of decision forests to feature tables.
+
+Features are quantised once to at most 64 levels at their quantiles; trees grow by
+information gain over a random subset of features a node (scikit-learn's random forest is the
+reference in the tests, an order of magnitude slower on this many classes and features).
+"""
+
+from dataclasses import dataclass
+
+from hooc_perception.core.config import Config, param
+from hooc_perception.core.forest import Forest, quantised
+from hooc_perception.training import fit_kernels
+from joblib import delayed, Parallel
+import numpy as np
+
+
+@dataclass(frozen=True)
+class FitConfig(Config):
+    """Parameters of forest growth."""
+
+    trees: int = param(40, 'Trees of the forest.', '', 1, 1000)
+    features_per_node: int = param(40, 'Features drawn at random at each node.', '', 1, 10000)
+    max_depth: int = param(26, 'Deepest split.', '', 1, 60)
+    min_leaf: int = param(6, 'Fewest training samples in a leaf.', '', 1, 10000)
+    min_gain_bits: float = param(0.005, 'Least information gain of a split.', 'bit', 0.0, 1.0)
+    bins: int = param(64, 'Quantisation levels of a feature.', '', 2, 255)
+    prior: float = param(0.3, 'Share of a leaf\'s mass, in samples, that is spread as in the '
+                         'whole training set, so that no class is ever impossible.', '', 0.0, 100)
+    sample_share: float = param(0.6, 'Share of the samples, without replacement, that grows a '
+                                'tree; all of them fill its leaves.', '', 0.01, 1.0)
+
+
+def thresholds(x, bins, rng):
+    """
+    Return (F, bins - 1) float32 ascending split values at the quantiles of x (n, F).
+
+    Estimated from at most 20000 rows; repeated values leave trailing +inf.
+    """
+    rows = np.sort(rng.choice(len(x), min(len(x), 20000), replace=False))
+    q = np.quantile(x[rows], np.linspace(0, 1, bins + 1)[1:-1], axis=0).astype(np.float32)
+    out = np.full((x.shape[1], bins - 1), np.inf, np.float32)
+    for f in range(x.shape[1]):
+        values = np.unique(q[:, f])
+        out[f, :len(values)] = values
+    return out
+
+
+def quantise(x, cuts):
+    """Return (F, n) uint8: the number of cuts (F, B) that are < each value of x (n, F)."""
+    out = np.empty((x.shape[1], len(x)), np.uint8)
+    for f in range(x.shape[1]):
+        out[f] = np.searchsorted(cuts[f], x[:, f], side='left')
+    return out
+
+
+def fit(binned, y, n_classes, cuts, config, rng, n_jobs=1, progress=None):
+    """
+    Return a Forest fitted to quantised features.
+
+    :param binned: (F, n) uint8 from `quantise`; y (n,) uint8 classes.
+    :param cuts: (F, B) float32 split values; bin b means value <= cuts[b].
+    :param rng: the same generator state gives the same forest whatever `n_jobs` is.
+    :param progress: called with 1 after every tree.
+    """
+    n = len(y)
+    prior = np.bincount(y, minlength=n_classes) / n
+    m = max(1, int(round(config.sample_share * n)))
+    seeds = rng.integers(1 << 31, size=(config.trees, 2))
+
+    def one(order_seed, node_seed):
+        order = np.random.default_rng(order_seed).permutation(n)[:m].astype(np.int32)
+        feature, split, left = fit_kernels.grow_tree(
+            binned, y, np.sort(order), n_classes, config.bins, config.features_per_node,
+            config.max_depth, config.min_leaf, config.min_gain_bits, int(node_seed))
+        end = fit_kernels.walk_binned(binned, feature, split, left)
+        threshold = np.zeros(len(feature), np.float32)
+        inner = feature >= 0
+        threshold[inner] = cuts[feature[inner], split[inner]]
+        counts = np.bincount(end * n_classes + y, minlength=len(feature) * n_classes)
+        counts = counts.reshape(-1, n_classes)[~inner] + config.prior * prior
+        if progress:
+            progress(1)
+        return feature, threshold, left, quantised(counts)
+
+    return joined(Parallel(n_jobs=n_jobs, prefer='threads')(delayed(one)(*s) for s in seeds))
+
+
+def joined(trees):
+    """Return the Forest of (feature, threshold, left, leaf_p) trees, leaves in node order."""
+    nodes = np.cumsum([0, *(len(t[0]) for t in trees)])
+    feature = np.concatenate([t[0] for t in trees])
+    left = np.concatenate([t[2] + start for t, start in zip(trees, nodes)])
+    leaf = np.where(feature < 0, np.cumsum(feature < 0) - 1, 0)
+    return Forest(feature.astype(np.int32), np.concatenate([t[1] for t in trees]),
+                  left.astype(np.int32), nodes[:-1].astype(np.int32), leaf.astype(np.int32),
+                  np.concatenate([t[3] for t in trees]))

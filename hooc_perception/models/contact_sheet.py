@@ -32,7 +32,7 @@ def contact_sheet(meshes, columns=COLUMNS, cell=CELL):
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(15)
     for i, (name, mesh) in enumerate(meshes.items()):
         x, y = i % columns * width, i // columns * (height + LABEL)
-        hue = np.array(Image.new('HSV', (1, 1), (i * 256 // max(len(meshes), 1), 70, 225))
+        hue = np.array(Image.new('HSV', (1, 1), (i * 256 // max(len(meshes), 1), 110, 215))
                        .convert('RGB'))[0, 0]
         picture = render_shaded([mesh], Orbit(), (width, height), [tuple(hue)])
         sheet.paste(Image.fromarray(picture), (x, y))
@@ -47,7 +47,7 @@ def main():
         print(__doc__)
         return 0 if '--help' in sys.argv or '-h' in sys.argv else 2
     sheet = contact_sheet({name: build() for name, build in CATALOGUE.items()})
-    sheet.quantize(128).save(sys.argv[1], optimize=True)
+    sheet.save(sys.argv[1], optimize=True)
     return 0
 
 

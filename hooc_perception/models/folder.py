@@ -79,7 +79,7 @@ def save_model_folder(path, name, models, classifier, profile, seed, cameras, ma
     names = [model.name for model in models]
     for item in [*names, *classifier]:
         _check_name(item, path)
-    if len(set(n.lower() for n in names)) != len(names):
+    if len({n.lower() for n in names}) != len(names):
         raise HoocError(f'two categories of {path} have the same name; rename one')
     path.parent.mkdir(parents=True, exist_ok=True)
     building = Path(tempfile.mkdtemp(prefix=f'.{path.name}-', dir=path.parent))
@@ -201,7 +201,7 @@ def _sha256(file):
 
 
 def _read_array(file):
-    """Return one .npy array, mapped copy-on-write; what is written to it never reaches the file."""
+    """Return one .npy array, mapped copy-on-write: writing to it leaves the file alone."""
     try:
         array = np.load(file, mmap_mode='c', allow_pickle=False)
     except (ValueError, OSError, EOFError, SyntaxError) as e:

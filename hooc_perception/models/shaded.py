@@ -14,7 +14,7 @@ import functools
 import logging
 import os
 
-from hooc_perception.core.geometry import back_project
+from hooc_perception.core.geometry import back_project, inverse, project, transform
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera
 import numpy as np
@@ -22,8 +22,8 @@ import trimesh
 
 log = logging.getLogger(__name__)
 
-GREY = (178, 184, 192)
-SMOOTH_BELOW_DEG = 40.0
+GREY = (150, 156, 164)
+SMOOTH_BELOW_DEG = 25.0
 # The numpy fallback draws this many times larger and averages.
 OVERSAMPLE = 2
 
@@ -35,27 +35,30 @@ class Orbit:
 
     :ivar azimuth_deg: where the viewer stands, from x towards y.
     :ivar elevation_deg: how far above the horizontal.
-    :ivar margin: 1.0 fits the bounding sphere; smaller comes closer.
+    :ivar fill: share of the picture that the meshes take, by width or by height.
     """
 
     azimuth_deg: float = -55.0
     elevation_deg: float = 35.0
-    margin: float = 0.9
+    fill: float = 0.88
 
     def camera(self, vertices, size):
         """Return the Camera that sees all vertices (V, 3) in a picture of size (width, height)."""
-        width, height = size
         low, high = np.min(vertices, axis=0), np.max(vertices, axis=0)
-        middle, radius = (low + high) / 2, max(np.linalg.norm(high - low) / 2, 1e-6)
-        focal = 2.2 * min(width, height)
-        distance = self.margin * radius * focal / (min(width, height) / 2) + radius
         a, e = np.radians(self.azimuth_deg), np.radians(self.elevation_deg)
         back = np.array([np.cos(a) * np.cos(e), np.sin(a) * np.cos(e), np.sin(e)])
         right = np.array([-np.sin(a), np.cos(a), 0.0])
         T_world_camera = np.eye(4)
         T_world_camera[:3, :3] = np.column_stack([right, np.cross(-back, right), -back])
-        T_world_camera[:3, 3] = middle + distance * back
-        K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1.0]])
+        # Far enough for a calm perspective; the focal length then fits what is seen.
+        distance = 2.5 * max(np.linalg.norm(high - low), 0.05)
+        T_world_camera[:3, 3] = (low + high) / 2 + distance * back
+        u, v = project(np.eye(3), transform(inverse(T_world_camera), vertices))
+        width, height = size
+        focal = self.fill * min(width / max(np.ptp(u), 1e-6), height / max(np.ptp(v), 1e-6))
+        K = np.array([[focal, 0, (width - 1) / 2 - focal * (u.min() + u.max()) / 2],
+                      [0, focal, (height - 1) / 2 - focal * (v.min() + v.max()) / 2],
+                      [0, 0, 1.0]])
         return Camera('orbit', width, height, K, np.zeros(5), T_world_camera)
 
 
@@ -97,7 +100,7 @@ def _pyrender():
         os.environ['PYOPENGL_PLATFORM'] = found[0]
     # pyrender 0.1.45 still says np.infty, which numpy 2 has dropped.
     if not hasattr(np, 'infty'):
-        np.infty = np.inf
+        np.inf = np.inf
     try:
         import pyrender
     except Exception as e:
@@ -118,12 +121,13 @@ def _by_pyrender(pairs, camera, colours, background):
     """Draw by OpenGL."""
     pyrender = _pyrender()
     scene = pyrender.Scene(bg_color=[*np.divide(background, 255.0), 1.0],
-                           ambient_light=[0.32, 0.32, 0.32])
+                           ambient_light=[0.22, 0.22, 0.22])
     for (vertices, faces), colour in zip(pairs, colours):
         mesh = trimesh.graph.smooth_shade(trimesh.Trimesh(vertices, faces, process=False),
                                           angle=np.radians(SMOOTH_BELOW_DEG), facet_minarea=None)
+        # Its factors are linear light, a picture's colours are not.
         material = pyrender.MetallicRoughnessMaterial(
-            baseColorFactor=[*np.divide(colour, 255.0), 1.0], metallicFactor=0.0,
+            baseColorFactor=[*np.divide(colour, 255.0) ** 2.2, 1.0], metallicFactor=0.0,
             roughnessFactor=0.8, doubleSided=True)
         scene.add(pyrender.Mesh.from_trimesh(mesh, material=material, smooth=True))
     # OpenGL looks along -z with y up, and its pixel centres lie at halves.
@@ -133,8 +137,8 @@ def _by_pyrender(pairs, camera, colours, background):
                                         znear=0.02, zfar=50.0), pose=T_world_gl)
     key = np.eye(4)
     key[:3, :3] = T_world_gl[:3, :3] @ trimesh.transformations.euler_matrix(-0.7, -0.6, 0)[:3, :3]
-    scene.add(pyrender.DirectionalLight(intensity=3.0), pose=key)
-    scene.add(pyrender.DirectionalLight(intensity=1.2), pose=T_world_gl)
+    scene.add(pyrender.DirectionalLight(intensity=2.3), pose=key)
+    scene.add(pyrender.DirectionalLight(intensity=0.9), pose=T_world_gl)
     renderer = _renderer()
     renderer.viewport_width, renderer.viewport_height = camera.width, camera.height
     return np.array(renderer.render(scene)[0], np.uint8)

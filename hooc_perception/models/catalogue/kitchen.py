@@ -18,7 +18,7 @@ import numpy as np
 def plate():
     """Return a dinner plate with a broad rim."""
     side = [(0.062, 0.0), (0.066, 0.003), (0.078, 0.012), (0.122, 0.022), (0.123, 0.0245)]
-    well = [(0.068, 0.004), (0.080, 0.0155), (0.120, 0.0246), (0.130, 0.030)]
+    well = [(0.063, 0.004), (0.077, 0.0155), (0.120, 0.0246), (0.130, 0.030)]
     return filled(side) - filled(well)
 
 
@@ -46,14 +46,15 @@ def frying_pan():
     inside = content(side, 0.004, 0.004, 56)
     line = curve([(0.105, 0.030), (0.150, 0.045), (0.220, 0.062), (0.300, 0.066)], 12)
     path = np.column_stack([line[:, 0], np.zeros(12), line[:, 1]])
-    width = np.interp(np.linspace(0, 1, 12), [0, 0.2, 0.8, 0.95, 1], [.008, .009, .014, .013, .008])
+    width = np.interp(np.linspace(0, 1, 12), [0, 0.2, 0.8, 0.95, 1],
+                      [0.008, 0.009, 0.014, 0.013, 0.008])
     handle = sweep(path, width, 0.0075, sides=12)
     eye = ellipse(0.008, 0.005, at=(0.284, 0.0)).extrude(0.2)
     return (filled(side, 56) - inside) + (handle - inside - eye)
 
 
 def dustpan():
-    """Return a dustpan: a scoop with a low front edge, side walls and a hollow back, on a handle."""
+    """Return a dustpan: a scoop with a low front edge and a high back, on a handle."""
     def scoop(inset, lift):
         front = box(0.004, 0.220 - 2 * inset, 0.003 + lift, at=(-0.105, 0.0, lift / 2))
         back = rounded_rectangle(0.080, 0.190 - 2 * inset, 0.030).extrude(0.058 + lift)

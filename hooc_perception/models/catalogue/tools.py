@@ -49,14 +49,14 @@ def screwdriver():
 def drill():
     """Return a cordless drill that stands on its battery."""
     body = cylinder(0.029, 0.110, at=(-0.075, 0.0, 0.160), axis='x', segments=28)
-    back = cylinder(0.022, 0.010, at=(-0.085, 0.0, 0.160), axis='x', top=0.029, segments=28)
+    back = cylinder(0.022, 0.011, at=(-0.085, 0.0, 0.160), axis='x', top=0.029, segments=28)
     chuck = (cylinder(0.024, 0.016, at=(0.035, 0.0, 0.160), axis='x', segments=28)
              + cylinder(0.021, 0.034, at=(0.051, 0.0, 0.160), axis='x', top=0.011, segments=28))
     bit = cylinder(0.0035, 0.045, at=(0.080, 0.0, 0.160), axis='x', segments=12)
     grip = sweep(curve([(-0.040, 0.0, 0.030), (-0.036, 0.0, 0.090), (-0.022, 0.0, 0.150)], 8),
                  0.017, [0.024, 0.022, 0.020, 0.020, 0.021, 0.023, 0.026, 0.028], 14,
                  up=(1.0, 0.0, 0.0))
-    trigger = box(0.016, 0.013, 0.030, at=(0.000, 0.0, 0.105))
+    trigger = box(0.026, 0.013, 0.030, at=(-0.008, 0.0, 0.105))
     battery = (rounded_box(0.110, 0.066, 0.034, 0.010, at=(-0.022, 0.0, 0.0))
                + rounded_box(0.080, 0.050, 0.012, 0.010, at=(-0.030, 0.0, 0.034)))
     return union(body, back, chuck, bit, grip, trigger, battery)

@@ -33,12 +33,12 @@ def glass():
 def jug():
     """Return a bellied jug with a lip to pour from and a large handle."""
     side = np.vstack([[(0.046, 0.0)], curve([(0.050, 0.004), (0.062, 0.050), (0.060, 0.100),
-                                             (0.047, 0.150), (0.050, 0.195)], 14)])
+                                             (0.047, 0.150), (0.050, 0.195)], 10)])
     lip = cylinder(0.010, 0.050, top=0.030).translate((-0.040, 0.0, 0.145))
     lip_inside = cylinder(0.0065, 0.060, top=0.032).translate((-0.040, 0.0, 0.147))
     inside = content(side, 0.0035, 0.006) + lip_inside
     handle = _ear([(0.046, 0.178), (0.080, 0.186), (0.108, 0.150), (0.100, 0.095), (0.056, 0.055)],
-                  0.006, 0.009, 20)
+                  0.006, 0.009, 16)
     return (filled(side) + lip - inside) + (handle - inside)
 
 

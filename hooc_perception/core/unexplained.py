@@ -1,0 +1,30 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""What was measured above the table and no object of the answer accounts for."""
+
+from hooc_perception.core.geometry import back_project, posed_vertices
+from hooc_perception.core.render import render_depth
+import numpy as np
+
+
+def unexplained_points(observation, objects, models, tolerance_m=0.02):
+    """
+    Return (n, 3) float64 world points of the foreground that the objects do not explain.
+
+    A pixel is explained where the composed depth of all objects lies within `tolerance_m` of
+    the measured one.
+
+    :param objects: Candidates.
+    :param models: tuple of GenericModel; class id c is models[c - 1].
+    """
+    meshes = []
+    for i in range(len(objects)):
+        model = models[int(objects.category[i]) - 1]
+        meshes.append((posed_vertices(model, objects.translation[i], objects.rotation_xyzw[i],
+                                      objects.size[i]), model.faces))
+    left = []
+    for view in observation.views:
+        composed, _ = render_depth(meshes, view.camera)
+        open_pixels = view.foreground & ~(np.abs(composed - view.depth) <= tolerance_m)
+        left.append(back_project(view.depth, view.camera)[open_pixels])
+    return np.concatenate(left) if left else np.zeros((0, 3))

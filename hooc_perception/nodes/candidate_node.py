@@ -1,0 +1,64 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stage 3: class probabilities -> pose candidates of every category."""
+
+import sys
+import time
+
+from geometry_msgs.msg import PoseArray
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.observe import observe
+from hooc_perception.core.propose import propose
+from hooc_perception.errors import HoocError
+from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.ros.conversions import header
+from hooc_perception.ros.spin import run_node
+from hooc_perception.ros.stage_messages import candidates_messages, probabilities_from_message
+from hooc_perception.ros.stage_node import StageConfig, StageNode
+from hooc_perception.ros.view_topics import ViewInput
+from sensor_msgs.msg import PointCloud2
+
+
+class CandidateNode(StageNode):
+    """Join views and probabilities, propose, publish candidates/*."""
+
+    def __init__(self, **kwargs):
+        """Declare parameters."""
+        super().__init__('candidate_node', StageConfig(), ('observe', 'propose'), **kwargs)
+
+    def configure(self):
+        """Load the generic models, build the endpoints."""
+        model = model_of(self.config)
+        self.models = model.models
+        self.poses = self.publisher(PoseArray, 'candidates/poses')
+        self.attributes = self.publisher(PointCloud2, 'candidates/attributes')
+        self.input = ViewInput(self, camera_names(self.config, model),
+                               {'probabilities': (PointCloud2, 'pixels/probabilities')},
+                               self.on_set)
+
+    def on_set(self, stamp_ns, views, messages):
+        """Propose candidates for one frame set."""
+        start = time.monotonic()
+        try:
+            observation = observe(views, self.parameters['observe'])
+            candidates = propose(
+                observation, probabilities_from_message(messages['probabilities']), self.models,
+                self.parameters['propose'], stage_rng(self.config.seed, 'propose'))
+        except HoocError as error:
+            self.diagnostics.error('propose', 'refused', str(error))
+            return
+        poses, attributes = candidates_messages(candidates,
+                                                header(stamp_ns, self.config.target_frame))
+        self.attributes.publish(attributes)
+        self.poses.publish(poses)
+        self.diagnostics.ok('propose', seconds=time.monotonic() - start,
+                            candidates=len(candidates))
+
+
+def main(args=None):
+    """Run the node; return the exit code."""
+    return run_node(CandidateNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

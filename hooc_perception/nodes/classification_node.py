@@ -1,0 +1,63 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stage 2: rectified frame sets -> class probabilities of the foreground pixels."""
+
+import sys
+import time
+
+from hooc_perception.core.classify import classify
+from hooc_perception.core.observe import observe
+from hooc_perception.errors import HoocError
+from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.ros.conversions import header, labels_message
+from hooc_perception.ros.spin import run_node
+from hooc_perception.ros.stage_messages import label_images, probabilities_message
+from hooc_perception.ros.stage_node import StageConfig, StageNode
+from hooc_perception.ros.view_topics import ViewInput
+from sensor_msgs.msg import Image, PointCloud2
+
+
+class ClassificationNode(StageNode):
+    """Observe, classify, publish pixels/*."""
+
+    def __init__(self, **kwargs):
+        """Declare parameters."""
+        super().__init__('classification_node', StageConfig(), ('observe', 'classify'), **kwargs)
+
+    def configure(self):
+        """Load the classifier, build the endpoints."""
+        model = model_of(self.config)
+        self.names = camera_names(self.config, model)
+        self.classes, self.classifier = [m.name for m in model.models], model.classifier
+        self.probabilities = self.publisher(PointCloud2, 'pixels/probabilities')
+        self.labels = [self.publisher(Image, 'pixels/<camera>/labels', f'pixels/{name}/labels')
+                       for name in self.names]
+        self.input = ViewInput(self, self.names, {}, self.on_views)
+
+    def on_views(self, stamp_ns, views, messages):
+        """Classify one frame set."""
+        start = time.monotonic()
+        head = header(stamp_ns, self.config.target_frame)
+        try:
+            observation = observe(views, self.parameters['observe'])
+            probabilities = classify(observation, self.classifier, self.parameters['classify'])
+            self.probabilities.publish(
+                probabilities_message(probabilities, observation, self.classes, head))
+        except HoocError as error:
+            self.diagnostics.error('classify', 'refused', str(error))
+            return
+        seconds = time.monotonic() - start
+        images = label_images(probabilities, observation)
+        for name, publisher, image in zip(self.names, self.labels, images):
+            frame = messages[f'{name}/depth_rect'].header.frame_id
+            publisher.publish(labels_message(image, header(stamp_ns, frame)))
+        self.diagnostics.ok('classify', seconds=seconds, pixels=len(probabilities.camera))
+
+
+def main(args=None):
+    """Run the node; return the exit code."""
+    return run_node(ClassificationNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

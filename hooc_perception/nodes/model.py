@@ -1,0 +1,24 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the nodes take from the MODEL folder."""
+
+from hooc_perception.errors import HoocError
+from hooc_perception.models.folder import load_model_folder
+
+
+def model_of(config):
+    """Return the ModelFolder that a StageConfig names; HoocError where it cannot be read."""
+    if not config.model:
+        raise HoocError('parameter model is empty; set it to the folder that hooc train wrote')
+    return load_model_folder(config.model)
+
+
+def camera_names(config, model=None):
+    """Return the names of the cameras that a StageConfig or its model (if loaded) names."""
+    names = config.cameras or tuple(
+        camera.name for camera in (model or model_of(config)).cameras)
+    if not names:
+        raise HoocError('parameter cameras is empty and the model names none; set cameras')
+    if len(set(names)) != len(names):
+        raise HoocError(f'parameter cameras names one twice: {", ".join(names)}')
+    return names

@@ -1,0 +1,109 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Stage 4: candidates -> the objects that together explain the frame set."""
+
+from dataclasses import dataclass
+import json
+import sys
+import time
+
+from geometry_msgs.msg import PoseArray
+from hooc_perception.core.config import param
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.observe import observe
+from hooc_perception.core.parse import parse
+from hooc_perception.core.unexplained import unexplained_points
+from hooc_perception.errors import HoocError
+from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.ros.detect_service import DetectService
+from hooc_perception.ros.object_output import ObjectOutput
+from hooc_perception.ros.spin import run_node
+from hooc_perception.ros.stage_messages import candidates_from_messages, probabilities_from_message
+from hooc_perception.ros.stage_node import StageConfig, StageNode
+from hooc_perception.ros.view_topics import ViewInput
+from sensor_msgs.msg import PointCloud2
+from std_srvs.srv import SetBool, Trigger
+
+
+@dataclass(frozen=True)
+class ParsingConfig(StageConfig):
+    """Parameters of the parsing node."""
+
+    max_instances: int = param(-1, 'Objects of one category in a scene at most; 0 sets no '
+                               "limit, -1 takes the model's.", '', -1, 1000)
+    detect_timeout_s: float = param(30.0, 'The detect service gives up after this time.', 's',
+                                    0.1, 600.0, runtime=True)
+
+
+class ParsingNode(StageNode):
+    """Join everything of one stamp, parse, publish objects/*."""
+
+    def __init__(self, **kwargs):
+        """Declare parameters."""
+        super().__init__('parsing_node', ParsingConfig(), ('observe', 'parse'), **kwargs)
+
+    def configure(self):
+        """Load the generic models, build the endpoints."""
+        model = model_of(self.config)
+        self.models, self.enabled = model.models, True
+        limit = self.config.max_instances
+        self.max_instances = model.max_instances if limit < 0 else limit
+        self.output = ObjectOutput(self, model.models, [
+            (model.mesh_path(m.name).resolve().as_uri(), model.mesh_sha256[m.name])
+            for m in model.models])
+        self.input = ViewInput(self, camera_names(self.config, model), {
+            'probabilities': (PointCloud2, 'pixels/probabilities'),
+            'poses': (PoseArray, 'candidates/poses'),
+            'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set)
+        self.detect = DetectService(self)
+        self.owned(self.destroy_service, self.create_service(SetBool, 'enable', self.on_enable))
+        self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
+
+    def activate(self):
+        """Say what the class ids mean."""
+        self.output.announce()
+
+    def on_set(self, stamp_ns, views, messages):
+        """Parse one frame set."""
+        if not self.enabled:
+            return
+        start = time.monotonic()
+        try:
+            observation = observe(views, self.parameters['observe'])
+            parsed = parse(
+                observation, probabilities_from_message(messages['probabilities']),
+                candidates_from_messages(messages['poses'], messages['attributes']),
+                self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
+                self.max_instances)
+        except HoocError as error:
+            self.diagnostics.error('parse', 'refused', str(error))
+            return
+        left = unexplained_points(observation, parsed.objects, self.models)
+        age_s = (self.now_ns() - stamp_ns) * 1e-9
+        ids = self.output.publish(parsed, stamp_ns, self.config.target_frame, age_s, left)
+        self.detect.answer(stamp_ns, parsed, ids, self.models)
+        self.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
+                            energy=float(parsed.energy.total), age_s=age_s)
+
+    def on_enable(self, request, response):
+        """Let frame sets be parsed, or ignore them."""
+        self.enabled = request.data
+        response.success = True
+        response.message = 'parsing' if self.enabled else 'frame sets are ignored'
+        return response
+
+    def on_reset(self, request, response):
+        """Forget what waits to be joined and take what viewers show away."""
+        self.input.join.clear()
+        self.output.clear()
+        response.success, response.message = True, json.dumps({'objects': 0})
+        return response
+
+
+def main(args=None):
+    """Run the node; return the exit code."""
+    return run_node(ParsingNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

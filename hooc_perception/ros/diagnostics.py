@@ -1,0 +1,85 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""A node's health, once a second on /diagnostics: one status a thing, with reason codes."""
+
+from collections import Counter
+import time
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+THROTTLE_S = 5.0
+# How long a report stays current: a trouble that does not come back is over.
+HOLD_S = 5.0
+
+
+class Diagnostics:
+    """
+    Collect reports about named things (a camera, the stage, the model) and publish them.
+
+    Also the one way to log trouble: each (thing, code) is logged at most every five seconds,
+    however often it is counted.
+    """
+
+    def __init__(self, node):
+        """Publish for `node` from now on, whatever its lifecycle state."""
+        self._node = node
+        self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
+        self._timer = node.create_timer(1.0, self._publish)
+        self._state = {}            # thing -> (level, code, sentence, monotonic seconds)
+        self._values = {}           # thing -> {key: value}
+        self._counts = Counter()    # (thing, code) -> number
+        self._logged = {}           # (thing, code) -> monotonic seconds
+
+    def ok(self, thing, **values):
+        """Report that `thing` works; `values` are shown with it."""
+        level, _, _, when = self._state.get(thing, (OK, '', '', 0.0))
+        # A warning stays visible for a while, or nobody would ever see it at 1 Hz.
+        if level == OK or time.monotonic() - when > HOLD_S:
+            self._state[thing] = (OK, 'ok', 'ok', time.monotonic())
+        self._values.setdefault(thing, {}).update(values)
+
+    def count(self, thing, code, number=1):
+        """Count what is normal but worth knowing (frames superseded)."""
+        self._counts[thing, code] += number
+        self._state.setdefault(thing, (OK, 'ok', 'ok', time.monotonic()))
+
+    def warn(self, thing, code, sentence):
+        """Report and log trouble that passes by itself or loses a frame."""
+        self._trouble(WARN, thing, code, sentence)
+
+    def error(self, thing, code, sentence):
+        """Report and log trouble that stops the node from giving answers."""
+        self._trouble(ERROR, thing, code, sentence)
+
+    def _trouble(self, level, thing, code, sentence):
+        now = time.monotonic()
+        self._counts[thing, code] += 1
+        self._state[thing] = (level, code, sentence, now)
+        if now - self._logged.get((thing, code), -THROTTLE_S) >= THROTTLE_S:
+            self._logged[thing, code] = now
+            logger = self._node.get_logger()
+            (logger.error if level == ERROR else logger.warning)(f'{thing}: {sentence}')
+
+    def statuses(self):
+        """Return the list of DiagnosticStatus as of now."""
+        name, result = self._node.get_name(), []
+        for thing, (level, code, sentence, _) in sorted(self._state.items()):
+            values = {'reason': code, **self._values.get(thing, {}),
+                      **{f'count_{c}': n for (t, c), n in sorted(self._counts.items())
+                         if t == thing}}
+            result.append(DiagnosticStatus(
+                level=level, name=f'{name}: {thing}', message=sentence,
+                hardware_id=self._node.get_namespace(),
+                values=[KeyValue(key=k, value=_text(v)) for k, v in values.items()]))
+        return result
+
+    def _publish(self):
+        message = DiagnosticArray(status=self.statuses())
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        self._publisher.publish(message)
+
+
+def _text(value):
+    """Return a value as short text."""
+    return f'{value:.6g}' if isinstance(value, float) else str(value)

@@ -1,0 +1,107 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The topics objects/* and scene/*: the answer, for programs and for viewers."""
+
+import colorsys
+import json
+import re
+
+from geometry_msgs.msg import PoseArray
+from hooc_perception.ros.conversions import header, pose_array_message
+from hooc_perception.ros.stage_messages import labels_json, objects_messages, points_message
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
+from visualization_msgs.msg import Marker, MarkerArray
+
+
+def topic_token(name):
+    """Return a name as a token that a topic may hold: letters, digits, underscores."""
+    token = re.sub(r'[^A-Za-z0-9_]', '_', name)
+    return f'_{token}' if token[:1].isdigit() else token
+
+
+class ObjectOutput:
+    """
+    Publish answers.
+
+    :param models: tuple of GenericModel; class id c is models[c - 1].
+    :param meshes: one (URI, sha256 in hex) a model.
+    """
+
+    def __init__(self, node, models, meshes):
+        """Create the publishers on a StageNode."""
+        self.models, self.meshes = models, meshes
+        self._next_id, self._shown = 1, []
+        self._poses = node.publisher(PoseArray, 'objects/poses')
+        self._attributes = node.publisher(PointCloud2, 'objects/attributes')
+        self._labels = node.publisher(String, 'objects/labels')
+        self._by_category = [
+            node.publisher(PoseArray, 'objects/<category>/poses',
+                           f'objects/{topic_token(model.name)}/poses') for model in models]
+        self._markers = node.publisher(MarkerArray, 'objects/markers')
+        self._unexplained = node.publisher(PointCloud2, 'scene/unexplained')
+        self._summary = node.publisher(String, 'scene/summary')
+
+    def announce(self):
+        """Latch what the class ids mean, before there is any answer."""
+        self._labels.publish(String(data=labels_json(self.models, self.meshes)))
+
+    def publish(self, parsed, stamp_ns, frame, age_s, unexplained):
+        """
+        Publish one answer; `objects/poses` goes last, so that whoever waits for it has all.
+
+        :param age_s: seconds since the stamp.
+        :param unexplained: (n, 3) world points.
+        :return: the instance ids: numbers that no earlier object had, since nothing is tracked.
+        """
+        head, found = header(stamp_ns, frame), parsed.objects
+        ids = list(range(self._next_id, self._next_id + len(found)))
+        self._next_id += len(found)
+        poses, attributes = objects_messages(parsed, ids, age_s, head)
+        self._labels.publish(String(data=labels_json(self.models, self.meshes, ids,
+                                                     found.category)))
+        self._attributes.publish(attributes)
+        for class_id, publisher in enumerate(self._by_category, 1):
+            mine = found.take(found.category == class_id)
+            publisher.publish(pose_array_message(mine.translation, mine.rotation_xyzw, head))
+        self._markers.publish(self._markers_message(poses, found, ids, head))
+        self._unexplained.publish(points_message(unexplained, head))
+        self._summary.publish(String(data=summary_json(parsed, stamp_ns)))
+        self._poses.publish(poses)
+        return ids
+
+    def clear(self):
+        """Take away what viewers show."""
+        self._markers.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
+        self._shown = []
+
+    def _markers_message(self, poses, found, ids, head):
+        """Return DELETE for what was shown and is gone, ADD for what stands there now."""
+        markers = [Marker(header=head, ns=ns, id=number, action=Marker.DELETE)
+                   for ns, number in self._shown]
+        self._shown = []
+        for i, number in enumerate(ids):
+            class_id = int(found.category[i])
+            model = self.models[class_id - 1]
+            marker = Marker(header=head, ns=model.name, id=number, action=Marker.ADD,
+                            type=Marker.MESH_RESOURCE, pose=poses.poses[i],
+                            mesh_resource=self.meshes[class_id - 1][0])
+            scale = found.size[i] / model.extents
+            marker.scale.x, marker.scale.y, marker.scale.z = (float(s) for s in scale)
+            hue = class_id * 0.618034 % 1.0     # golden ratio: neighbours differ
+            marker.color.r, marker.color.g, marker.color.b = colorsys.hsv_to_rgb(hue, 0.6, 0.95)
+            marker.color.a = 0.8
+            self._shown.append((model.name, number))
+            markers.append(marker)
+        return MarkerArray(markers=markers)
+
+
+def summary_json(parsed, stamp_ns):
+    """Return the text of `scene/summary`: how the answer came about."""
+    energy = parsed.energy
+    return json.dumps({
+        'format': 'hooc-summary/1', 'stamp_ns': stamp_ns,
+        'energy': {'total': float(energy.total), 'depth': float(energy.depth),
+                   'probability': float(energy.probability), 'overlap': float(energy.overlap)},
+        'converged': bool(parsed.converged), 'candidates': len(parsed.pool),
+        'seconds': {name: float(s) for name, s in parsed.seconds.items()}})

@@ -1,0 +1,127 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Core Config dataclasses as ROS parameters: declared once, in the dataclass.
+
+A field `f` of section `parse` becomes the parameter `parse.f`; a node's own fields have no
+prefix. Values that a Config refuses are refused with its sentence as the reason.
+"""
+
+from dataclasses import fields, replace
+import sys
+
+from hooc_perception.errors import HoocError
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+
+_INT64 = 2 ** 63 - 1
+
+
+def descriptor(f):
+    """Return the ParameterDescriptor of a Config field: meaning, unit, range, read-only."""
+    m = f.metadata
+    message = ParameterDescriptor(description=m['doc'] + (f' [{m["unit"]}]' if m['unit'] else ''))
+    message.read_only = m.get('read_only', False)
+    # An empty list has no type for rclpy to infer.
+    message.dynamic_typing = isinstance(f.default, tuple)
+    low, high = m['low'], m['high']
+    if low is not None or high is not None:
+        if isinstance(f.default, int):
+            message.integer_range = [IntegerRange(
+                from_value=-_INT64 if low is None else int(low),
+                to_value=_INT64 if high is None else int(high))]
+        else:
+            message.floating_point_range = [FloatingPointRange(
+                from_value=-sys.float_info.max if low is None else float(low),
+                to_value=sys.float_info.max if high is None else float(high))]
+    if m['choices']:
+        message.additional_constraints = 'one of: ' + ', '.join(map(repr, m['choices']))
+    if not m['runtime']:
+        note = 'may change only while the node is unconfigured'
+        message.additional_constraints = '; '.join(
+            filter(None, [message.additional_constraints, note]))
+    return message
+
+
+class Parameters:
+    """
+    The declared parameters of a node and the Config objects that they amount to.
+
+    :ivar configs: {section: Config}, always consistent with the node's parameters.
+    """
+
+    def __init__(self, node, is_unconfigured):
+        """
+        Attach to a node.
+
+        :param is_unconfigured: callable, True while start-up parameters may still change.
+        """
+        self._node, self._is_unconfigured = node, is_unconfigured
+        self.configs = {}
+        node.add_on_set_parameters_callback(self._on_set)
+
+    def declare(self, section, config):
+        """
+        Declare every field of a Config, with the values of `config` as defaults.
+
+        :return: the Config with what YAML files and the command line override.
+        :raises HoocError: where such an override is refused, naming the parameter.
+        """
+        values = {}
+        for f in fields(config):
+            name = f'{section}.{f.name}' if section else f.name
+            default = getattr(config, f.name)
+            default = list(default) if isinstance(default, tuple) else default
+            try:
+                value = self._node.declare_parameter(name, default, descriptor(f)).value
+            except Exception as error:      # rclpy raises several unrelated types here
+                raise HoocError(f'parameter {name} of {self._node.get_name()} cannot be used: '
+                                f'{error}') from error
+            values[f.name] = _from_ros(value, f)
+        self.configs[section] = _checked(section, config, values)
+        return self.configs[section]
+
+    def __getitem__(self, section):
+        """Return the Config of a section, as it is now."""
+        return self.configs[section]
+
+    def _on_set(self, parameters):
+        """Accept changes that the Configs accept; say why not otherwise."""
+        changed = dict(self.configs)
+        for parameter in parameters:
+            section, _, name = parameter.name.rpartition('.')
+            # Unknown here: still being declared, or not one of ours (use_sim_time, QoS).
+            if section not in changed or name not in {f.name for f in fields(changed[section])}:
+                continue
+            f = next(f for f in fields(changed[section]) if f.name == name)
+            if not f.metadata['runtime'] and not self._is_unconfigured():
+                return SetParametersResult(successful=False, reason=(
+                    f'{parameter.name} shapes what the node has already built: deactivate and '
+                    f'clean up {self._node.get_name()} first, then set it and configure again'))
+            try:
+                changed[section] = _checked(section, changed[section],
+                                            {name: _from_ros(parameter.value, f)})
+            except HoocError as error:
+                return SetParametersResult(successful=False, reason=str(error))
+        self.configs = changed
+        return SetParametersResult(successful=True)
+
+
+def _from_ros(value, f):
+    """Return a parameter's value as the type of its field; the Config judges the rest."""
+    is_list = isinstance(f.default, tuple) and not isinstance(value, (str, bytes))
+    return tuple(value) if is_list and hasattr(value, '__iter__') else value
+
+
+def _checked(section, config, values):
+    """Return `config` with `values`; its complaint names the section as well."""
+    try:
+        return replace(config, **values)
+    except HoocError as error:
+        text = str(error)
+        raise HoocError(text.replace('parameter ', f'parameter {section}.', 1)
+                        if section else text) from error

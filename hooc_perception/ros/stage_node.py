@@ -1,0 +1,189 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""What the lifecycle nodes share: parameters, transitions that explain failures, endpoints."""
+
+from dataclasses import dataclass, field
+import json
+import os
+
+from hooc_perception.core.config import Config, param
+from hooc_perception.errors import HoocError
+from hooc_perception.ros.diagnostics import Diagnostics
+from hooc_perception.ros.parameters import Parameters
+from hooc_perception.ros.qos import overridable, qos
+from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
+
+PROFILES = ('paper', 'best', 'fast')
+
+
+def fixed_param(*args, **kwargs):
+    """Declare a parameter that never changes after the node has started; as `param`."""
+    declared = param(*args, **kwargs)
+    return field(default=declared.default, metadata={**declared.metadata, 'read_only': True})
+
+
+@dataclass(frozen=True)
+class StageConfig(Config):
+    """Parameters of every node of the chain."""
+
+    model: str = param('', 'Folder that `hooc train` wrote.')
+    profile: str = fixed_param(
+        '', 'Which method: paper, best or fast; empty takes the one that the model was trained '
+        'for. Gives the defaults of the stages.', choices=('',) + PROFILES)
+    cameras: tuple = param((), 'Names of the cameras, the same order in every node; empty takes '
+                           "the model's.")
+    target_frame: str = param('table', 'Frame of all results: z up, z = 0 is the table top.')
+    seed: int = param(0, 'Seed of every random choice; the stages derive theirs from it.',
+                      '', 0, 2 ** 31 - 1)
+
+
+class StageNode(LifecycleNode):
+    """
+    A lifecycle node that explains why a transition fails and cleans up behind itself.
+
+    Sub-classes implement `configure()` (build the core object and the endpoints) and may
+    implement `activate()`, `deactivate()` and `cleanup()`; any HoocError there makes the
+    transition fail with its sentence in the log.
+
+    :param config: the node's own Config with its defaults.
+    :param stages: names of the profile's Configs that the node uses; then `config` is a
+        StageConfig.
+    """
+
+    def __init__(self, name, config, stages=(), **kwargs):
+        """Declare all parameters; `kwargs` go to rclpy.node.Node."""
+        super().__init__(name, **{'namespace': '/hooc', **kwargs})
+        self.active = False
+        self._mine = []
+        self.parameters = Parameters(self, self.is_unconfigured)
+        self.diagnostics = Diagnostics(self)
+        self.parameters.declare('', config)
+        for stage, default in self._stage_defaults(stages).items():
+            self.parameters.declare(stage, default)
+
+    @property
+    def config(self):
+        """Return the node's own Config as it is now."""
+        return self.parameters['']
+
+    def now_ns(self):
+        """Return the node's time (simulated with use_sim_time) in nanoseconds."""
+        return self.get_clock().now().nanoseconds
+
+    def is_unconfigured(self):
+        """Return whether start-up parameters may still change."""
+        machine = getattr(self, '_state_machine', None)
+        return machine is None or machine.current_state[1] == 'unconfigured'
+
+    def _stage_defaults(self, stages):
+        """Return {stage: Config} of the profile that parameters or the model name."""
+        if not stages:
+            return {}
+        from hooc_perception.core.profiles import profile
+        name = self.config.profile
+        if not name:
+            try:
+                with open(os.path.join(self.config.model, 'model.json'), encoding='utf-8') as file:
+                    name = json.load(file).get('profile')
+            except (OSError, ValueError, AttributeError):
+                pass    # configuring says what is wrong with the model
+        chosen = profile(name if name in PROFILES else 'best')
+        return {stage: getattr(chosen, stage) for stage in stages}
+
+    # Endpoints, made while configuring and destroyed by cleaning up.
+
+    def publisher(self, kind, topic, name=None):
+        """Return a lifecycle publisher on `name` with the QoS of the table's row `topic`."""
+        made = self.create_lifecycle_publisher(kind, name or topic, qos(topic),
+                                               qos_overriding_options=overridable())
+        self._mine.append((self.destroy_lifecycle_publisher, made))
+        return made
+
+    def subscription(self, kind, topic, callback, name=None):
+        """Return a subscription on `name` with the QoS of the table's row `topic`."""
+        made = self.create_subscription(kind, name or topic, callback, qos(topic),
+                                        qos_overriding_options=overridable())
+        self._mine.append((self.destroy_subscription, made))
+        return made
+
+    def owned(self, destroy, made):
+        """Have `destroy(made)` called by cleaning up; return `made`."""
+        self._mine.append((destroy, made))
+        return made
+
+    # Hooks of the sub-classes.
+
+    def configure(self):
+        """Build the core object and the endpoints."""
+
+    def activate(self):
+        """Start to work."""
+
+    def deactivate(self):
+        """Stop to work."""
+
+    def cleanup(self):
+        """Forget what was built."""
+
+    # Transitions.
+
+    def on_configure(self, state):
+        """Build, or say why not and undo the half of it."""
+        def build():
+            self.configure()
+            LifecycleNode.on_configure(self, state)
+        if self._attempt('configure', build):
+            return TransitionCallbackReturn.SUCCESS
+        self._destroy()
+        return TransitionCallbackReturn.FAILURE
+
+    def on_activate(self, state):
+        """Let the publishers speak and the callbacks work."""
+        def start():
+            LifecycleNode.on_activate(self, state)
+            self.activate()
+            self.active = True
+        done = self._attempt('activate', start)
+        return TransitionCallbackReturn.SUCCESS if done else TransitionCallbackReturn.FAILURE
+
+    def on_deactivate(self, state):
+        """Silence the node; what was built stays."""
+        self.active = False
+        self._attempt('deactivate', self.deactivate)
+        return LifecycleNode.on_deactivate(self, state)
+
+    def on_cleanup(self, state):
+        """Forget what was built."""
+        self._destroy()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state):
+        """Stop for good."""
+        self.active = False
+        self._destroy()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_error(self, state):
+        """Fall back to unconfigured, from where one can try again."""
+        self.active = False
+        self._destroy()
+        return TransitionCallbackReturn.SUCCESS
+
+    def _attempt(self, what, step):
+        """Return whether `step()` went through; log the sentence or the surprise otherwise."""
+        try:
+            step()
+            return True
+        except HoocError as error:
+            self.diagnostics.error('node', f'{what}_failed', str(error))
+        except Exception as error:
+            # rclpy would swallow it, and the transition would fail without a word.
+            self.diagnostics.error('node', f'{what}_failed',
+                                   f'unexpected {type(error).__name__}: {error}')
+        return False
+
+    def _destroy(self):
+        self._attempt('cleanup', self.cleanup)
+        while self._mine:
+            destroy, made = self._mine.pop()
+            destroy(made)

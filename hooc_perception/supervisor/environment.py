@@ -1,0 +1,86 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The environment of the nodes: transport for large images, isolation of parallel runs."""
+
+import os
+from pathlib import Path
+import random
+import shutil
+import socket
+import sys
+
+from hooc_perception.errors import HoocError
+from hooc_perception.ros.spin import PARENT_VARIABLE
+
+FAST_DDS_PROFILE = Path(__file__).with_name('fast_dds.xml')
+FAST_DDS_VARIABLES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+SHARED_MEMORY = Path('/dev/shm')
+SEGMENT_BYTES = 64 * 2 ** 20
+# Domains above would use ports that the system gives to outgoing connections.
+DOMAINS = range(1, 102)
+
+
+def claim_domain():
+    """
+    Return (domain id, claim) of a ROS domain that no other run on this machine uses.
+
+    The claim is a socket: keep it while the domain is in use; the system frees it even if
+    this process is killed.
+
+    :raises HoocError: where all of them are taken.
+    """
+    if sys.platform != 'linux':
+        return random.choice(DOMAINS), socket.socket()
+    for domain in random.sample(DOMAINS, len(DOMAINS)):
+        # An abstract address: no file to leave behind, and as private as the network that
+        # the domain lives in.
+        claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            claim.bind(f'\0hooc_perception.domain.{domain}')
+            return domain, claim
+        except OSError:
+            claim.close()
+    raise HoocError(f'all {len(DOMAINS)} ROS domains are in use by runs on this machine; stop '
+                    'some, or set ROS_DOMAIN_ID')
+
+
+def isolate():
+    """
+    Keep this process and its children apart from all other ROS traffic; return the claim.
+
+    What the user has set (ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE) is respected.
+    """
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+    if os.environ.get('ROS_DOMAIN_ID'):
+        return None
+    domain, claim = claim_domain()
+    os.environ['ROS_DOMAIN_ID'] = str(domain)
+    return claim
+
+
+def use_large_segments(processes=8):
+    """
+    Have Fast DDS use shared-memory segments that hold several images, where there is room.
+
+    :param processes: how many such segments there will be.
+    :return: whether the profile is in use. Not where the user has one of their own, nor where
+        shared memory is too small (containers often have 64 MB): writing to a segment
+        without room behind it would kill the process.
+    """
+    if any(os.environ.get(name) for name in FAST_DDS_VARIABLES):
+        return False
+    if not SHARED_MEMORY.is_dir() or (
+            shutil.disk_usage(SHARED_MEMORY).free < 1.25 * processes * SEGMENT_BYTES):
+        return False
+    os.environ.update(dict.fromkeys(FAST_DDS_VARIABLES, str(FAST_DDS_PROFILE)))
+    return True
+
+
+def child_environment():
+    """Return the environment of a node's process."""
+    package_root = str(Path(__file__).resolve().parents[2])
+    paths = [package_root, *filter(None, os.environ.get('PYTHONPATH', '').split(os.pathsep))]
+    return {**os.environ, 'PYTHONPATH': os.pathsep.join(dict.fromkeys(paths)),
+            'PYTHONUNBUFFERED': '1', PARENT_VARIABLE: str(os.getpid()),
+            'RCUTILS_COLORIZED_OUTPUT': '0',
+            'RCUTILS_CONSOLE_OUTPUT_FORMAT': '[{severity}] {message}'}

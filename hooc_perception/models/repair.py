@@ -46,15 +46,15 @@ def closed(mesh):
 def to_manifold(mesh):
     """Return the manifold3d.Manifold of a mesh; its status tells whether it is one."""
     return manifold3d.Manifold(manifold3d.Mesh64(
-        np.ascontiguousarray(mesh.vertices, np.float64),
-        np.ascontiguousarray(mesh.faces, np.uint64)))
+        np.array(mesh.vertices, np.float64, order='C'),
+        np.array(mesh.faces, np.uint64, order='C')))
 
 
 def from_manifold(solid):
     """Return the trimesh.Trimesh of a manifold3d.Manifold."""
     out = solid.to_mesh64()
-    return trimesh.Trimesh(np.asarray(out.vert_properties)[:, :3],
-                           np.asarray(out.tri_verts).astype(np.int64), process=False)
+    return trimesh.Trimesh(np.array(out.vert_properties[:, :3]),
+                           np.array(out.tri_verts, np.int64), process=False)
 
 
 def _is_solid(mesh):

@@ -9,8 +9,10 @@ import trimesh
 
 # A turned surface is the same when 98 % of it comes to lie within this share of its greatest
 # distance from the axis: low enough to see a teacup's handle or the two widths of a box, high
-# enough for the facets of a 16-sided cylinder (2 %) and a little modelling noise.
+# enough for the facets of a 16-sided cylinder (2 %) and a little modelling noise. For thin
+# things the share of the thinnest side counts: a knife's blade is not like its handle.
 TOLERANCE = 0.07
+TOLERANCE_THIN = 0.12
 QUANTILE = 0.98
 SAMPLES, DENSE = 500, 12000
 ORDERS = (6, 4, 3, 2)
@@ -33,7 +35,7 @@ def axis_symmetry(mesh, rng):
     out = np.ones(3, np.int32)
     for axis in range(3):
         radius = np.linalg.norm(np.delete(mesh.vertices, axis, axis=1), axis=1).max()
-        limit = floor + TOLERANCE * radius
+        limit = floor + min(TOLERANCE * radius, TOLERANCE_THIN * mesh.extents.min())
 
         def same(degrees, axis=axis, limit=limit):
             turned = Rotation.from_euler('xyz'[axis], degrees, degrees=True).apply(samples)

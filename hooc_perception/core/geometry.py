@@ -21,6 +21,21 @@ def pose_from_matrix(T_a_b):
     return T_a_b[:3, 3].copy(), Rotation.from_matrix(T_a_b[:3, :3]).as_quat(canonical=True)
 
 
+def canonical_pose(T_a_b):
+    """
+    Return the (4, 4) transform next to T_a_b that survives a trip through a quaternion.
+
+    Matrix -> quaternion -> matrix changes the last bits. Here the quaternion, scaled so that
+    its largest component is 1, is rounded to 2^-30 (1e-9 rad), far more than such a trip
+    changes: before and after it, the result is the same to the last bit. Processes that hand
+    on poses as quaternions and those that keep the matrix therefore agree.
+    """
+    q = Rotation.from_matrix(T_a_b[:3, :3]).as_quat()
+    q = np.round(q / q[np.argmax(np.abs(q))] * 2.0 ** 30) / 2.0 ** 30
+    # Of equal components the first one decides on the sign; adding 0 turns -0 into 0.
+    return matrix_from_pose(T_a_b[:3, 3], q * q[np.argmax(np.abs(q))] + 0.0)
+
+
 def inverse(T_a_b):
     """Return T_b_a of a rigid (4, 4) transform."""
     T_b_a = np.eye(4)

@@ -10,7 +10,7 @@ depth of the empty scene, and the foreground: what stands on the table.
 from dataclasses import dataclass, replace
 
 from hooc_perception.core.config import Config, param
-from hooc_perception.core.geometry import back_project, rays
+from hooc_perception.core.geometry import back_project, canonical_pose, rays
 from hooc_perception.core.kernels.undistort import rectify_nearest
 from hooc_perception.core.types import Observation, ObservedView, RectifiedView
 from hooc_perception.errors import HoocError
@@ -61,7 +61,9 @@ def rectify(view, config=ObserveConfig()):
     d[:len(camera.D)] = camera.D[:8]
     depth = rectify_nearest(depth, np.ascontiguousarray(camera.K, np.float64), d)
     depth[~(depth <= config.max_depth_m) | (depth <= 0)] = np.nan
-    return RectifiedView(replace(camera, D=np.zeros(len(camera.D))), depth)
+    # The pose goes to other processes as a quaternion and must mean the same there.
+    return RectifiedView(replace(camera, D=np.zeros(len(camera.D)),
+                                 T_world_camera=canonical_pose(camera.T_world_camera)), depth)
 
 
 def observe(views, config=ObserveConfig()):

@@ -95,8 +95,7 @@ class IngestionNode(StageNode):
         self.sent = (frame_set.stamp_ns, self.now_ns())
         frames = [image.header.frame_id or f'{name}_optical_frame'
                   for name, (image, _, _) in zip(self.names, frame_set.frames)]
-        self.output.publish(frame_set.stamp_ns, self.config.target_frame, views, frames,
-                            [transform for _, _, transform in frame_set.frames])
+        self.output.publish(frame_set.stamp_ns, self.config.target_frame, views, frames)
         self.diagnostics.ok('views', stamp_ns=frame_set.stamp_ns)
 
     def chain_is_busy(self):

@@ -3,9 +3,9 @@
 """
 Camera messages <-> core types, exactly there and back.
 
-Poses travel as (translation, quaternion) in float64 and become a matrix only at the end, by
-`core.geometry.matrix_from_pose`, so that every process computes the same matrix as the
-one-process chain does from the same quaternion.
+Poses travel as (translation, quaternion) in float64. Cameras are built from them by
+`core.geometry.canonical_pose`, as core.observe.rectify does it, so that every process has the
+same matrix as the one-process chain.
 """
 
 from array import array
@@ -13,7 +13,7 @@ from array import array
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose, PoseArray, TransformStamped
 from hooc_perception.core.depth_encodings import decode_depth, decode_image, METRES
-from hooc_perception.core.geometry import matrix_from_pose
+from hooc_perception.core.geometry import canonical_pose, matrix_from_pose
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -141,8 +141,8 @@ def camera_from_messages(name, info, transform):
                         'must have norm 1')
     if len(D) == 0:
         D = np.zeros(_COEFFICIENTS[model])
-    return Camera(name, info.width, info.height, K, D, matrix_from_pose(translation, rotation),
-                  model)
+    return Camera(name, info.width, info.height, K, D,
+                  canonical_pose(matrix_from_pose(translation, rotation)), model)
 
 
 def pose_array_message(translation, rotation_xyzw, head):

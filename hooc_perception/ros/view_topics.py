@@ -3,7 +3,7 @@
 """The topics views/*: rectified frame sets, from ingestion to the later nodes, bit for bit."""
 
 from geometry_msgs.msg import TransformStamped
-from hooc_perception.core.geometry import back_project
+from hooc_perception.core.geometry import back_project, pose_from_matrix
 from hooc_perception.core.types import RectifiedView
 from hooc_perception.ros.conversions import (
     camera_from_messages,
@@ -12,7 +12,6 @@ from hooc_perception.ros.conversions import (
     depth_message,
     header,
     nanoseconds,
-    pose_of_transform,
     transform_message,
 )
 from hooc_perception.ros.frame_sets import StampJoin
@@ -33,20 +32,18 @@ class ViewOutput:
                                    for suffix, kind in _KINDS] for name in names}
         self._points = node.publisher(PointCloud2, 'views/points')
 
-    def publish(self, stamp_ns, target_frame, views, frames, transforms):
+    def publish(self, stamp_ns, target_frame, views, frames):
         """
         Publish one frame set.
 
         :param views: RectifiedView a camera.
         :param frames: frame_id of each camera's optical frame.
-        :param transforms: the TransformStamped that each view's camera was built from; its
-            quaternion goes on untouched, see ros/conversions.py.
         """
-        for view, frame, transform in zip(views, frames, transforms):
+        for view, frame in zip(views, frames):
             head = header(stamp_ns, frame)
             info, extrinsics, depth = self._publishers[view.camera.name]
             info.publish(camera_info_message(view.camera, head))
-            extrinsics.publish(transform_message(*pose_of_transform(transform),
+            extrinsics.publish(transform_message(*pose_from_matrix(view.camera.T_world_camera),
                                                  header(stamp_ns, target_frame), frame))
             depth.publish(depth_message(view.depth, head))
         # Ten megabytes a set: only for those who look.

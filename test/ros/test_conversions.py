@@ -4,8 +4,9 @@
 
 from dataclasses import replace
 
-from hooc_perception.core.geometry import matrix_from_pose
-from hooc_perception.core.types import Camera
+from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
+from hooc_perception.core.observe import rectify
+from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 import numpy as np
 import pytest
@@ -55,24 +56,34 @@ def test_labels_come_back():
         c.labels_from_message(sent(c.labels_message(labels, c.header(0, '')))), labels)
 
 
-@pytest.mark.parametrize('seed', range(20))
-def test_camera_is_the_same_after_two_hops(seed):
-    """Raw info + extrinsics -> Camera -> messages -> Camera: every bit, for any quaternion."""
-    rng = np.random.default_rng(seed)
-    translation, rotation = rng.normal(size=3), rng.normal(size=4)
-    # As a file gives it: rounded, so not quite of norm 1, and of either sign.
-    rotation = np.round(rotation / np.linalg.norm(rotation), 5)
-    camera = a_camera(rng, translation, rotation)
-    transform = sent(c.transform_message(translation, rotation, c.header(1, 'table'), 'left'))
-    info = sent(c.camera_info_message(camera, c.header(1, 'left')))
-    for _ in range(2):
-        again = c.camera_from_messages('left', info, transform)
-        for name in ('K', 'D', 'T_world_camera'):
-            assert getattr(again, name).tobytes() == getattr(camera, name).tobytes(), name
-        assert (again.width, again.height, again.distortion_model) == (51, 42, 'plumb_bob')
-        info = sent(c.camera_info_message(again, c.header(2, 'left')))
-        transform = sent(c.transform_message(*c.pose_of_transform(transform),
-                                             c.header(2, 'table'), 'left'))
+ROTATIONS = [*np.random.default_rng(0).normal(size=(200, 4)),
+             # Half turns, quarter turns, equal components: where signs and pivots may flip.
+             [1, 0, 0, 0], [1, 0, 0, 1e-17], [1, 0, 0, -1e-17], [0.5, 0.5, 0.5, 0.5],
+             [-0.5, 0.5, -0.5, 0.5], [np.sqrt(.5), 0, 0, np.sqrt(.5)], [0, 0, 0, 1],
+             [np.sqrt(.5), -np.sqrt(.5), 0, 0], [0.6, -0.6, 0.2, 0.1]]
+
+
+def test_camera_is_the_same_after_every_hop():
+    """A scene file's pose, a bag's quaternion of its matrix, two topics: every bit agrees."""
+    rng = np.random.default_rng(1)
+    for rotation in ROTATIONS:
+        translation = rng.normal(size=3)
+        # As a file gives it: rounded, so not quite of norm 1, and of either sign.
+        rotation = np.round(rotation / np.linalg.norm(rotation), 5)
+        T_file = matrix_from_pose(translation, rotation)
+        expected = rectify(DepthView(a_camera(rng, translation, rotation),
+                                     np.ones((42, 51), np.float32))).camera
+        assert np.abs(expected.T_world_camera - T_file).max() < 2e-9
+        info = sent(c.camera_info_message(expected, c.header(1, 'left')))
+        transform = sent(c.transform_message(*pose_from_matrix(T_file), c.header(1, 'table'), ''))
+        for _ in range(3):
+            again = c.camera_from_messages('left', info, transform)
+            for name in ('K', 'D', 'T_world_camera'):
+                assert getattr(again, name).tobytes() == getattr(expected, name).tobytes(), name
+            assert (again.width, again.height, again.distortion_model) == (51, 42, 'plumb_bob')
+            info = sent(c.camera_info_message(again, c.header(2, 'left')))
+            transform = sent(c.transform_message(*pose_from_matrix(again.T_world_camera),
+                                                 c.header(2, 'table'), 'left'))
 
 
 def test_rational_polynomial_is_kept():

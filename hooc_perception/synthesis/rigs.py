@@ -29,16 +29,18 @@ def undistorted(camera):
 
 
 def ring(rng, count, width=512, height=424, focal=366.0, elevation=(0.45, 0.95),
-         distance=(0.95, 1.45), names=None):
+         distance=(0.95, 1.45), jitter=0.2, names=None):
     """
     Return `count` cameras around the origin, roughly evenly spread and a little askew.
 
-    :param elevation: range above the horizon, radians; :param distance: range, metres.
+    :param elevation: range above the horizon, radians; `distance`: range, metres.
+    :param jitter: half the range of a camera's place on the ring, as a share of the gap to
+        the next.
     """
     start = rng.uniform(-np.pi, np.pi)
     cameras = []
     for i in range(count):
-        azimuth = start + 2 * np.pi * (i + rng.uniform(-0.2, 0.2)) / count
+        azimuth = start + 2 * np.pi * (i + rng.uniform(-jitter, jitter)) / count
         lift, far = rng.uniform(*elevation), rng.uniform(*distance)
         position = far * np.array([np.cos(azimuth) * np.cos(lift),
                                    np.sin(azimuth) * np.cos(lift), np.sin(lift)])

@@ -34,6 +34,9 @@ class SettleConfig(Config):
                             0.02, 5.0)
     drop_m: float = param(0.01, 'Height that an object is dropped from, above what lies there.',
                           'm', 0.0, 0.5)
+    places: int = param(1, 'Places looked at for each object; the lowest one is taken. 1 heaps '
+                        'things up, more spread them as a hand does.', '', 1, 50)
+    large_first: bool = param(False, 'Lay large things down first, by and large.')
     between_s: float = param(0.16, 'Time between two objects.', 's', 0.02, 5.0)
     rest_s: float = param(1.6, 'Longest time to come to rest after the last one.', 's',
                           0.1, 30.0)
@@ -69,12 +72,14 @@ def settle(bodies, rng, config=SettleConfig()):
     """
     if not bodies:
         return []
+    areas = np.array([_footprint(body) for body in bodies])
     order = rng.permutation(len(bodies))
+    if config.large_first:
+        order = np.argsort(-areas * np.exp(0.5 * rng.standard_normal(len(bodies))))
     bodies = [bodies[i] for i in order]
     model = _compile(bodies)
     data = mujoco.MjData(model)
-    radius = np.sqrt(sum(ConvexHull(b.vertices[:, np.argsort(np.ptp(b.vertices, axis=0))[1:]]
-                                    ).volume for b in bodies) / (np.pi * config.crowding))
+    radius = np.sqrt(areas.sum() / (np.pi * config.crowding))
     released = []
     for i, body in enumerate(bodies):
         _release(model, data, bodies, i, released, radius, rng, config)
@@ -137,18 +142,17 @@ def _release(model, data, bodies, i, released, radius, rng, config):
         rotation = Rotation.from_quat(rng.standard_normal(4))
     turned = body.vertices @ rotation.as_matrix().T
     low, high = turned.min(axis=0), turned.max(axis=0)
+    piled = [transform(_pose(data, j), bodies[j].vertices) for j in released]
     # A place inside the disc for the whole object where it fits, for its middle otherwise.
     room = max(radius - 0.25 * np.linalg.norm((high - low)[:2]), 0.3 * radius)
-    angle, r = rng.uniform(0, 2 * np.pi), room * np.sqrt(rng.random())
-    xy = np.array([r * np.cos(angle), r * np.sin(angle)]) - 0.5 * (low + high)[:2]
-    top = 0.0
-    for j in released:
-        other = data.qpos[7 * j:7 * j + 7]
-        points = transform(matrix_from_pose(other[:3], other[[4, 5, 6, 3]]), bodies[j].vertices)
-        under = np.all((points[:, :2] > low[:2] + xy) & (points[:, :2] < high[:2] + xy), axis=1)
-        if _boxes_meet(points, low[:2] + xy, high[:2] + xy):
-            top = max(top, points[under, 2].max() if under.any() else points[:, 2].max())
-    data.qpos[7 * i:7 * i + 3] = [*xy, top - low[2] + config.drop_m]
+    best, lowest = None, np.inf
+    for _ in range(config.places):
+        angle, r = rng.uniform(0, 2 * np.pi), room * np.sqrt(rng.random())
+        xy = np.array([r * np.cos(angle), r * np.sin(angle)]) - 0.5 * (low + high)[:2]
+        top = max((_top(points, low[:2] + xy, high[:2] + xy) for points in piled), default=0.0)
+        if top < lowest:
+            best, lowest = xy, top
+    data.qpos[7 * i:7 * i + 3] = [*best, lowest - low[2] + config.drop_m]
     data.qpos[7 * i + 3:7 * i + 7] = rotation.as_quat()[[3, 0, 1, 2]]
     data.qvel[6 * i:6 * i + 6] = 0.0
     geoms = model.geom_bodyid == i + 1
@@ -159,10 +163,25 @@ def _release(model, data, bodies, i, released, radius, rng, config):
     model.body_conaffinity[i + 1] = 1
 
 
-def _boxes_meet(points, low, high):
-    """Return whether the bounding box of points (n, 3), seen from above, meets a rectangle."""
-    return bool(np.all(points[:, :2].min(axis=0) < high)
-                and np.all(points[:, :2].max(axis=0) > low))
+def _footprint(body):
+    """Return the area that a body covers when it lies on its broadest side, m^2."""
+    broad = np.argsort(np.ptp(body.vertices, axis=0))[1:]
+    return ConvexHull(body.vertices[:, broad]).volume
+
+
+def _pose(data, i):
+    """Return T_world_model (4, 4) of body i."""
+    pose = data.qpos[7 * i:7 * i + 7]
+    return matrix_from_pose(pose[:3], pose[[4, 5, 6, 3]])
+
+
+def _top(points, low, high):
+    """Return how high points (n, 3) reach over a rectangle of the table, 0 if they miss it."""
+    if np.any(points[:, :2].min(axis=0) > high) or np.any(points[:, :2].max(axis=0) < low):
+        return 0.0
+    over = np.all((points[:, :2] > low) & (points[:, :2] < high), axis=1)
+    # Large faces may cover the rectangle without a vertex in it.
+    return points[over, 2].max() if over.any() else points[:, 2].max()
 
 
 def _at_rest(model, data, i, body, config):

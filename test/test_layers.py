@@ -1,0 +1,116 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Who may import whom: the layers of the package, read off the syntax trees."""
+
+import ast
+from pathlib import Path
+import sys
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent / 'hooc_perception'
+
+# What a layer may use beside the standard library, `errors` and itself; 'a.b' admits only that
+# module. The command line (cli) is the only layer that may use anything.
+ALLOWED = {
+    'core': {'numpy', 'scipy', 'numba'},
+    'models': {'numpy', 'scipy', 'numba', 'trimesh', 'manifold3d', 'networkx', 'yaml', 'PIL',
+               'pyrender', 'OpenGL', 'hooc_perception.core'},
+    'scenes': {'numpy', 'scipy', 'yaml', 'cv2', 'trimesh', 'hooc_perception.core',
+               'hooc_perception.models.mesh'},
+    'replay': {'numpy', 'scipy', 'yaml', 'cv2', 'rosbags', 'hooc_perception.core',
+               'hooc_perception.scenes'},
+    'synthesis': {'numpy', 'scipy', 'numba', 'yaml', 'cv2', 'fcl', 'mujoco', 'trimesh',
+                  'manifold3d', 'open3d', 'joblib', 'tqdm',
+                  'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.scenes'},
+    'training': {'numpy', 'scipy', 'numba', 'sklearn', 'lightgbm', 'joblib', 'tqdm',
+                 'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.synthesis'},
+    'evaluation': {'numpy', 'scipy', 'yaml', 'cv2', 'PIL', 'sklearn', 'matplotlib', 'jinja2',
+                   'markupsafe', 'pyrender', 'OpenGL', 'trimesh', 'open3d', 'tqdm',
+                   'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.scenes'},
+    'ros': {'numpy', 'rclpy', 'hooc_perception.core'},
+    'nodes': {'numpy', 'rclpy', 'hooc_perception.core', 'hooc_perception.ros',
+              'hooc_perception.models.folder'},
+    'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',
+                   'hooc_perception.ros', 'hooc_perception.nodes', 'hooc_perception.models.folder',
+                   'hooc_perception.scenes', 'hooc_perception.replay'},
+}
+# Message packages; tf2 and launch exist only on a ROS installation and stand behind guards.
+MESSAGES = {'action_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
+            'lifecycle_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs',
+            'tf2_ros', 'visualization_msgs', 'ament_index_python'}
+for ros_layer in ('ros', 'nodes', 'supervisor'):
+    ALLOWED[ros_layer] |= MESSAGES
+EXCEPTIONS = {
+    ('nodes/replay_node.py', 'hooc_perception.replay'),
+}
+
+
+def imported_modules(path):
+    """Yield (line, dotted module) of every import in a file, those inside functions too."""
+    for node in ast.walk(ast.parse(path.read_text(), str(path))):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f'{path}:{node.lineno}: relative import'
+            if node.module.startswith('hooc_perception'):
+                # `from hooc_perception.models import folder` names models.folder.
+                for alias in node.names:
+                    yield node.lineno, f'{node.module}.{alias.name}'
+            else:
+                yield node.lineno, node.module
+
+
+def permitted(module, layer, relative):
+    """Say whether `layer` may import `module` in the file `relative` (posix path)."""
+    if module.split('.')[0] in sys.stdlib_module_names:
+        return True
+    allowed = ALLOWED[layer] | {f'hooc_perception.{layer}', 'hooc_perception.errors'}
+    allowed |= {name for file, name in EXCEPTIONS if file == relative}
+    return any(module == name or module.startswith(name + '.') for name in allowed)
+
+
+def violations(path, package=PACKAGE):
+    """Return one sentence for each import of `path` that its layer does not permit."""
+    relative = path.relative_to(package).as_posix()
+    layer = relative.split('/')[0]
+    return [f'{relative}:{line}: {layer} must not import {module}'
+            for line, module in imported_modules(path) if not permitted(module, layer, relative)]
+
+
+@pytest.mark.parametrize('layer', sorted(ALLOWED))
+def test_layer_imports_only_what_lies_below(layer):
+    found = [text for path in sorted((PACKAGE / layer).rglob('*.py')) for text in violations(path)]
+    assert not found, '\n'.join(found)
+
+
+def test_every_folder_has_a_rule():
+    folders = {path.parent.relative_to(PACKAGE).parts[0] for path in PACKAGE.glob('*/**/*.py')}
+    folders |= {path.parent.name for path in PACKAGE.glob('*/*.py')}
+    assert folders - {'cli'} <= set(ALLOWED), 'a new layer needs a row in ALLOWED'
+
+
+def test_top_level_modules_import_nothing_heavy():
+    for name in ('__init__.py', 'errors.py'):
+        for line, module in imported_modules(PACKAGE / name):
+            assert module.split('.')[0] in sys.stdlib_module_names, f'{name}:{line}: {module}'
+
+
+@pytest.mark.parametrize('source', [
+    'import rclpy', 'from hooc_perception.models.mesh import load_mesh',
+    'from hooc_perception import models', 'def f():\n    import trimesh.util'])
+def test_the_rule_notices(tmp_path, source):
+    path = tmp_path / 'core' / 'bad.py'
+    path.parent.mkdir()
+    path.write_text(source)
+    assert len(violations(path, tmp_path)) == 1
+
+
+def test_the_rule_lets_through(tmp_path):
+    path = tmp_path / 'core' / 'good.py'
+    path.parent.mkdir()
+    path.write_text('import os\nimport numba as nb\nfrom scipy.spatial import cKDTree\n'
+                    'from hooc_perception.errors import HoocError\n'
+                    'from hooc_perception.core import types\n')
+    assert violations(path, tmp_path) == []

@@ -1,0 +1,122 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Pictures of depth, classes and residuals as small PNGs, and outlines as SVG paths."""
+
+import base64
+import colorsys
+import io
+
+import cv2
+from hooc_perception.core.geometry import back_project
+from matplotlib import colormaps
+import numpy as np
+from PIL import Image
+
+NOTHING = (38, 42, 51)
+RESIDUAL_M = 0.06
+
+
+def colours(names):
+    """Return {name: (r, g, b) 0..255}, distinct hues in the order of the sorted names."""
+    out = {}
+    for i, name in enumerate(sorted(names)):
+        # Steps of the golden angle keep neighbours in the alphabet far apart in hue.
+        hue = (0.02 + i * 0.381966) % 1.0
+        light, strong = ((0.62, 0.80), (0.52, 0.62), (0.72, 0.70))[i % 3]
+        out[name] = tuple(int(255 * c) for c in colorsys.hls_to_rgb(hue, light, strong))
+    return out
+
+
+def hex_colour(rgb):
+    """Return '#rrggbb'."""
+    return '#' + ''.join(f'{int(c):02x}' for c in rgb)
+
+
+def data_uri(rgb):
+    """Return a data: URI of an (h, w, 3) uint8 image as a PNG of at most 256 colours."""
+    image = Image.fromarray(np.ascontiguousarray(rgb)).quantize(
+        256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    stream = io.BytesIO()
+    image.save(stream, 'PNG', optimize=True)
+    return 'data:image/png;base64,' + base64.b64encode(stream.getvalue()).decode()
+
+
+def hillshade(depth, camera, sigma=1.2):
+    """
+    Return (H, W) float 0..1: how a lamp beside the camera lights a surface of this depth.
+
+    :param depth: (H, W) float, NaN or inf = none; smoothed over `sigma` pixels first.
+    """
+    known = np.isfinite(depth)
+    filled = np.where(known, depth, 0).astype(np.float32)
+    weight = known.astype(np.float32)
+    if sigma:
+        filled = cv2.GaussianBlur(filled, (0, 0), sigma)
+        weight = cv2.GaussianBlur(weight, (0, 0), sigma)
+    with np.errstate(invalid='ignore', divide='ignore'):
+        smooth = np.where(known, filled / weight, np.nan)
+    points = back_project(smooth, camera)
+    normals = np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0))
+    eye = camera.T_world_camera[:3, 3]
+    lamp = eye + 0.5 * camera.T_world_camera[:3, 0] - 0.8 * camera.T_world_camera[:3, 1]
+    ray = lamp - points
+    with np.errstate(invalid='ignore', divide='ignore'):
+        cosine = (np.einsum('ijk,ijk->ij', normals, ray)
+                  / np.linalg.norm(normals, axis=-1) / np.linalg.norm(ray, axis=-1))
+    return np.nan_to_num(np.abs(cosine), nan=0.6)
+
+
+def depth_picture(depth, camera, low, high):
+    """Return (H, W, 3) uint8: colour by depth between `low` and `high` metres, shaded."""
+    known = np.isfinite(depth)
+    share = np.clip((np.where(known, depth, low) - low) / max(high - low, 1e-3), 0, 1)
+    # A quiet scale, so that the outlines' colours stand out.
+    rgb = colormaps['bone'](0.9 - 0.6 * share)[..., :3] * 255
+    rgb *= (0.3 + 0.8 * hillshade(depth, camera) ** 1.5)[..., None]
+    rgb[~known] = NOTHING
+    return np.clip(rgb, 0, 255).astype(np.uint8)
+
+
+def class_picture(shade, classes, names, palette):
+    """Return (H, W, 3) uint8: pixels of class ids (H, W), 0 = background, over a grey shade."""
+    grey = 60 + 120 * np.repeat(shade[..., None], 3, -1)
+    table = np.array([(0, 0, 0)] + [palette[name] for name in names], np.float64)
+    coloured = table[classes] * (0.55 + 0.45 * shade[..., None])
+    return np.where((classes > 0)[..., None], coloured, grey).clip(0, 255).astype(np.uint8)
+
+
+def residual_picture(measured, explained):
+    """
+    Return (H, W, 3) uint8: measured minus explained depth, within RESIDUAL_M both ways.
+
+    Red: the measured surface is nearer than explained (something is not explained); blue:
+    farther (an object stands where there is nothing).
+    """
+    known = np.isfinite(measured) & np.isfinite(explained)
+    gap = np.where(known, explained - np.where(known, measured, 0), 0)
+    rgb = colormaps['RdBu_r'](np.clip(gap / (2 * RESIDUAL_M) + 0.5, 0, 1))[..., :3] * 255
+    rgb[~known] = NOTHING
+    return rgb.astype(np.uint8)
+
+
+def outline(mask, scale=1.0):
+    """
+    Return (SVG path, (x, y) of the label, area) of a (H, W) bool mask; None where it is empty.
+
+    Pixel (0, 0) covers the unit square at the origin of the path's coordinates.
+    """
+    contours, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
+    parts = []
+    for contour in contours:
+        if len(contour) < 3:
+            continue
+        corner = cv2.approxPolyDP(contour, 0.7, True)[:, 0] + 0.5
+        if len(corner) > 2:
+            parts.append('M' + 'L'.join(f'{x * scale:.4g} {y * scale:.4g}' for x, y in corner)
+                         + 'Z')
+    if not parts:
+        return None
+    # The innermost point of the mask carries the name: it lies on the object, whatever shape.
+    inner = cv2.distanceTransform(np.pad(mask, 1).astype(np.uint8), cv2.DIST_L2, 5)[1:-1, 1:-1]
+    y, x = np.unravel_index(int(inner.argmax()), inner.shape)
+    return ''.join(parts), ((x + 0.5) * scale, (y + 0.5) * scale), int(mask.sum())

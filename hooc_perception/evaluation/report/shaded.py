@@ -1,0 +1,42 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Shaded pictures of posed objects on a piece of the table, two of them from one place."""
+
+from hooc_perception.models.shaded import Orbit, render_shaded
+import numpy as np
+
+TABLE_RGB = (214, 207, 194)
+BACKGROUND = (236, 239, 243)
+ELEVATION_DEG = 42.0
+BORDER_M = 0.05
+
+
+def table_mesh(meshes, cells=24):
+    """Return (vertices, faces) of the table top below all meshes, with a border; z = 0."""
+    points = np.concatenate([v for v, _ in meshes])
+    low, high = points.min(0)[:2] - BORDER_M, points.max(0)[:2] + BORDER_M
+    # Several cells: a lamp is computed at corners, and large triangles would look flat.
+    x, y = (np.linspace(a, b, cells + 1) for a, b in zip(low, high))
+    grid = np.stack([*np.meshgrid(x, y, indexing='ij'), np.full((cells + 1,) * 2, -0.001)], -1)
+    corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
+    faces = np.concatenate([np.stack([corner, corner + cells + 1, corner + cells + 2], 1),
+                            np.stack([corner, corner + cells + 2, corner + 1], 1)])
+    return grid.reshape(-1, 3), faces.astype(np.int32)
+
+
+def shaded_picture(meshes, colours, camera, framed, size=(640, 440)):
+    """
+    Return (h, w, 3) uint8: meshes in their colours on the table, from `camera`'s side.
+
+    :param meshes: sequence of (vertices (V, 3) world metres, faces (F, 3)).
+    :param colours: one (r, g, b) 0..255 a mesh.
+    :param framed: the meshes that the picture is framed on, so that two pictures compare.
+    """
+    if not framed:
+        return np.full((size[1], size[0], 3), BACKGROUND, np.uint8)
+    table = table_mesh(framed)
+    middle = (table[0].min(0) + table[0].max(0)) / 2
+    eye = camera.T_world_camera[:3, 3] - middle
+    view = Orbit(float(np.degrees(np.arctan2(eye[1], eye[0]))), ELEVATION_DEG, 0.97).camera(
+        np.concatenate([table[0], *(v for v, _ in framed)]), size)
+    return render_shaded([table, *meshes], view, size, [TABLE_RGB, *colours], BACKGROUND)

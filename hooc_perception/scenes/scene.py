@@ -76,7 +76,7 @@ class Scene:
         views = [DepthView(c, d) for c, d in zip(self.source_cameras, self._depth_images)]
         return estimate_table_frame(views, self.name)
 
-    @property
+    @cached_property
     def cameras(self):
         """Return the tuple of Camera, posed in the table's frame."""
         if self.table_known:

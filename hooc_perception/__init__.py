@@ -1,3 +1,8 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """Everything that stands on the table: categories and 6D poses from depth alone."""
+
+from hooc_perception import kernel_cache
+
+# Before the first kernel is imported: numba reads the variable only once.
+kernel_cache.choose()

@@ -1,0 +1,72 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Where compiled kernels go when the package, or even the user's home, is read-only."""
+
+import os
+from pathlib import Path
+import subprocess
+import sys
+
+from hooc_perception import kernel_cache
+import pytest
+
+
+@pytest.fixture
+def read_only(monkeypatch, tmp_path):
+    """Make everything called `locked` unwritable, also for root."""
+    real = os.access
+    monkeypatch.setattr(os, 'access', lambda path, mode:
+                        'locked' not in str(path) and real(path, mode))
+    (tmp_path / 'locked').mkdir()
+    return tmp_path / 'locked'
+
+
+def test_a_writable_package_needs_nothing(tmp_path):
+    environment = {}
+    kernel_cache.choose(environment, tmp_path)
+    assert not environment
+
+
+def test_the_users_cache_is_left_to_numba(read_only, tmp_path):
+    environment = {'XDG_CACHE_HOME': str(tmp_path / 'cache')}
+    kernel_cache.choose(environment, read_only)
+    assert 'NUMBA_CACHE_DIR' not in environment
+
+
+def test_without_a_home_a_private_folder_serves(read_only, tmp_path):
+    environment = {'XDG_CACHE_HOME': str(read_only / 'cache')}
+    kernel_cache.choose(environment, read_only, tmp_path)
+    folder = Path(environment['NUMBA_CACHE_DIR'])
+    assert folder.parent == tmp_path
+    assert folder.stat().st_mode & 0o777 == 0o700
+    again = {'XDG_CACHE_HOME': str(read_only / 'cache')}
+    kernel_cache.choose(again, read_only, tmp_path)
+    assert again == environment
+
+
+def test_the_users_choice_wins(read_only):
+    environment = {'NUMBA_CACHE_DIR': 'mine', 'XDG_CACHE_HOME': str(read_only)}
+    kernel_cache.choose(environment, read_only)
+    assert environment['NUMBA_CACHE_DIR'] == 'mine'
+
+
+@pytest.mark.parametrize('plant', ['link', 'open to all'])
+def test_a_planted_folder_is_not_trusted(tmp_path, plant):
+    expected = tmp_path / f'hooc_perception-kernels-{os.getuid()}'
+    if plant == 'link':
+        (tmp_path / 'theirs').mkdir()
+        expected.symlink_to(tmp_path / 'theirs')
+    else:
+        expected.mkdir()
+        expected.chmod(0o777)
+    folder = kernel_cache.private_folder(tmp_path)
+    assert folder != expected
+    assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_kernels_are_kept_in_the_chosen_folder(tmp_path):
+    code = ('import numpy as np; from hooc_perception.core.kernels import raster; '
+            'raster.project_vertices(np.ones((1, 3)), np.eye(3), np.zeros(3), 1., 1., 0., 0.)')
+    subprocess.run([sys.executable, '-c', code], check=True,
+                   env={**os.environ, 'NUMBA_CACHE_DIR': str(tmp_path)})
+    assert list(tmp_path.rglob('*.nbc'))

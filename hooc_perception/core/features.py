@@ -94,6 +94,8 @@ class Surroundings:
     voxel: np.ndarray
     voxel_points: np.ndarray
     voxel_normals: np.ndarray
+    pairs: np.ndarray
+    weight: np.ndarray
     ids: np.ndarray
     frames: np.ndarray
     shapes: np.ndarray
@@ -130,7 +132,8 @@ def surroundings(observation, pixels):
         n = int(row.max()) + 1
         frames[level, :n], shapes[level, :n] = segments.describe(row, n, mean, normal, voxel_cell)
     top = features.height_map(pixels.points, low, cell, shape[0], shape[1])
-    return Surroundings(low, cell, field, top, voxel, mean, normal, ids, frames, shapes)
+    return Surroundings(low, cell, field, top, voxel, mean, normal, pairs, weight, ids, frames,
+                        shapes)
 
 
 def pixel_features(pixels, around, probes, rows):

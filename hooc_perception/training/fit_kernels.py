@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Growing one decision tree on quantised features, by information gain."""
 
+from hooc_perception.core.kernels.forest_pixels import respond
 import numba as nb
 import numpy as np
 
@@ -137,3 +138,112 @@ def walk_binned(binned, feature, split, left):
             node = left[node] + (1 if binned[feature[node], i] > split[node] else 0)
         out[i] = node
     return out
+
+
+@nb.njit(cache=True, nogil=True)
+def _draw_tests(n, n_views, region, centre_share, view, offsets):
+    """Fill the first n random tests: a view and two offsets (metres), or one and the centre."""
+    for t in range(n):
+        view[t] = np.random.randint(0, n_views)
+        for k in range(4):
+            offsets[t, k] = np.random.uniform(-region, region)
+        if np.random.random() < centre_share:
+            offsets[t, 2], offsets[t, 3] = 0.0, 0.0
+
+
+@nb.njit(cache=True, nogil=True)
+def grow_pixel_tree(images, scene, centre, y, samples, n_classes, n_tests, n_thresholds, region,
+                    centre_share, node_samples, max_depth, min_leaf, min_gain, far, seed):
+    """
+    Return (feature, threshold, left, view, offsets) of one multi-view tree.
+
+    Each node draws `n_tests` tests over all views and thresholds from their responses, on at
+    most `node_samples` of its pixels, and keeps the split with the largest information gain.
+
+    :param images: (S, V, H, W) uint16 mm; scene (n,), centre (n, V, 3), y (n,) of pixels.
+    :param samples: (m,) int32 pixels that grow the tree; reordered in place.
+    :return: as in `core.pixel_forest.PixelForest`, one test an inner node.
+    """
+    np.random.seed(seed)
+    m, n_views = samples.shape[0], images.shape[1]
+    capacity = 2 * (m // max(min_leaf, 1)) + 3
+    feature = np.full(capacity, -1, np.int32)
+    threshold = np.zeros(capacity, np.float32)
+    left = np.zeros(capacity, np.int32)
+    test_view = np.zeros(capacity, np.uint8)
+    test_offsets = np.zeros((capacity, 4), np.float32)
+    n_tests_kept = 0
+    table = x_log_x(max(m, 2))
+    view = np.zeros(n_tests, np.uint8)
+    offsets = np.zeros((n_tests, 4), np.float32)
+    histogram = np.zeros((n_thresholds + 1, n_classes), np.int32)
+    bin_sizes = np.zeros(n_thresholds + 1, np.int32)
+    response = np.empty(node_samples, np.int32)
+    values = np.empty(node_samples, np.uint8)
+    classes = np.empty(node_samples, np.uint8)
+    cuts = np.empty(n_thresholds, np.int32)
+    buffer = np.empty(m, np.int32)
+    stack = [(0, 0, m, 0)]
+    used = 1
+    while len(stack):
+        node, lo, hi, depth = stack.pop()
+        n = hi - lo
+        if depth >= max_depth or n < 2 * min_leaf:
+            continue
+        # A random subset of a large node suffices to rank tests; its cost is bounded.
+        k = min(n, node_samples)
+        if k < n:
+            for i in range(k):
+                j = i + np.random.randint(0, n - i)
+                samples[lo + i], samples[lo + j] = samples[lo + j], samples[lo + i]
+        counts = np.zeros(n_classes, np.int64)
+        for i in range(k):
+            classes[i] = y[samples[lo + i]]
+            counts[classes[i]] += 1
+        if counts.max() == k:
+            continue
+        _draw_tests(n_tests, n_views, region, centre_share, view, offsets)
+        least = max(1, min_leaf * k // n)
+        best, best_test, best_cut = min_gain * k, -1, 0
+        for t in range(n_tests):
+            v = view[t]
+            for i in range(k):
+                s = samples[lo + i]
+                response[i] = respond(images[scene[s], v], centre[s, v], offsets[t, 0],
+                                      offsets[t, 1], offsets[t, 2], offsets[t, 3], far)
+            for b in range(n_thresholds):
+                cuts[b] = response[np.random.randint(0, k)]
+            cuts.sort()
+            for i in range(k):
+                values[i] = np.searchsorted(cuts, response[i])
+            gain, b = best_split(values[:k], classes[:k], counts, n_thresholds + 1, table, least,
+                                 histogram, bin_sizes)
+            if gain > best:
+                best, best_test, best_cut = gain, t, cuts[b]
+        if best_test < 0:
+            continue
+        v = view[best_test]
+        a, b = lo, 0
+        for i in range(lo, hi):
+            s = samples[i]
+            r = respond(images[scene[s], v], centre[s, v], offsets[best_test, 0],
+                        offsets[best_test, 1], offsets[best_test, 2], offsets[best_test, 3], far)
+            if r <= best_cut:
+                samples[a] = s
+                a += 1
+            else:
+                buffer[b] = s
+                b += 1
+        for i in range(b):
+            samples[a + i] = buffer[i]
+        if a == lo or b == 0 or used + 2 > capacity:
+            continue
+        feature[node], threshold[node], left[node] = n_tests_kept, best_cut, used
+        test_view[n_tests_kept] = v
+        test_offsets[n_tests_kept] = offsets[best_test]
+        n_tests_kept += 1
+        stack.append((used + 1, a, hi, depth + 1))
+        stack.append((used, lo, a, depth + 1))
+        used += 2
+    return (feature[:used], threshold[:used], left[:used], test_view[:n_tests_kept],
+            test_offsets[:n_tests_kept])

@@ -1,0 +1,35 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`hooc train`: a MODEL folder from a set's generic meshes and cameras."""
+
+from pathlib import Path
+import time
+
+HELP = ('Train a model from the generic meshes and the cameras of a scene set. Its scenes are '
+        'never read. Profile paper learns for exactly this rig; best and fast serve any.')
+
+
+def add_arguments(parser):
+    """Declare the arguments of `hooc train`."""
+    parser.add_argument('set', type=Path, metavar='SET', help='folder of a scene set')
+    parser.add_argument('--out', type=Path, required=True, metavar='MODEL',
+                        help='model folder to write; an older one is replaced')
+    parser.add_argument('--profile', choices=('paper', 'best', 'fast'), default='best')
+    parser.add_argument('--seed', type=int, default=0,
+                        help='same seed, same model (default: %(default)s)')
+    parser.add_argument('--jobs', type=int, default=0, metavar='N',
+                        help='parallel workers, 0 = all cores; does not change the model')
+
+
+def run(args):
+    """Train and say where the model is."""
+    from hooc_perception.errors import HoocError
+    from hooc_perception.scenes.scene_set import load_scene_set
+    from hooc_perception.training.train import train
+    if args.seed < 0 or args.jobs < 0:
+        raise HoocError('--seed and --jobs must not be negative')
+    start = time.monotonic()
+    folder = train(load_scene_set(args.set), args.out, args.profile, args.seed,
+                   jobs=args.jobs)
+    print(f'{folder.path}: {len(folder.models)} categories, profile {folder.profile}, '
+          f'{time.monotonic() - start:.0f} s')

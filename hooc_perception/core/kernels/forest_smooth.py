@@ -1,0 +1,105 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Thinning of pixels, and spreading of probabilities over the surface graph of all views."""
+
+import numba as nb
+import numpy as np
+
+SAME_SURFACE_M = 0.015
+
+
+@nb.njit(cache=True)
+def thin(camera, uv, points, stride):
+    """
+    Return (rows (k,), donor (n,)): pixels to classify, and the one that speaks for each.
+
+    Rows are the pixels on a grid of `stride`, and those with no such pixel within `stride`
+    pixels and SAME_SURFACE_M; `donor` indexes into `rows`.
+
+    :param uv: (n, 2) uint16, in row-major order within each camera.
+    """
+    n = camera.shape[0]
+    donor = np.full(n, -1, np.int64)
+    rows = np.empty(n, np.int64)
+    k, start = 0, 0
+    while start < n:
+        stop = start
+        height, width = 0, 0
+        while stop < n and camera[stop] == camera[start]:
+            width, height = max(width, int(uv[stop, 0]) + 1), int(uv[stop, 1]) + 1
+            stop += 1
+        index = np.full((height, width), -1, np.int64)
+        for i in range(start, stop):
+            u, v = int(uv[i, 0]), int(uv[i, 1])
+            if u % stride == 0 and v % stride == 0:
+                index[v, u] = k
+                rows[k] = i
+                donor[i] = k
+                k += 1
+        for i in range(start, stop):
+            if donor[i] >= 0:
+                continue
+            u, v = int(uv[i, 0]), int(uv[i, 1])
+            best = SAME_SURFACE_M
+            u0, v0 = u - u % stride, v - v % stride
+            for a in (u0, u0 + stride):
+                for b in (v0, v0 + stride):
+                    if a < width and b < height and index[b, a] >= 0:
+                        q = points[i] - points[rows[index[b, a]]]
+                        d = np.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
+                        if d < best:
+                            best, donor[i] = d, index[b, a]
+        for i in range(start, stop):
+            if donor[i] < 0:
+                donor[i] = k
+                rows[k] = i
+                k += 1
+        start = stop
+    return rows[:k], donor
+
+
+@nb.njit(cache=True)
+def spread(p, voxel, n_voxels, pairs, weight, steps):
+    """
+    Return (n_voxels, C) float32 probabilities, spread over a weighted graph.
+
+    Each step replaces a voxel's distribution by the weighted mean of its neighbours' and of
+    what its own pixels say; voxels without a pixel start unknown and take their neighbours'.
+
+    :param p: (k, C) float32 of pixels, voxel (k,) where they lie.
+    :param pairs: (e, 2) int32; weight (e,) float32 in [0, 1].
+    """
+    n_classes = p.shape[1]
+    own = np.zeros((n_voxels, n_classes), np.float32)
+    count = np.zeros(n_voxels, np.float32)
+    for i in range(p.shape[0]):
+        own[voxel[i]] += p[i]
+        count[voxel[i]] += 1
+    for v in range(n_voxels):
+        if count[v] > 0:
+            own[v] /= count[v]
+    now, known = own.copy(), count > 0
+    new, total = np.empty_like(own), np.empty(n_voxels, np.float32)
+    for _ in range(steps):
+        for v in range(n_voxels):
+            new[v] = own[v]
+            total[v] = 1.0 if count[v] > 0 else 0.0
+        for e in range(pairs.shape[0]):
+            a, b, w = pairs[e, 0], pairs[e, 1], weight[e]
+            if known[b]:
+                for c in range(n_classes):
+                    new[a, c] += w * now[b, c]
+                total[a] += w
+            if known[a]:
+                for c in range(n_classes):
+                    new[b, c] += w * now[a, c]
+                total[b] += w
+        for v in range(n_voxels):
+            if total[v] > 1e-6:
+                known[v] = True
+                for c in range(n_classes):
+                    now[v, c] = new[v, c] / total[v]
+    for v in range(n_voxels):
+        if not known[v]:
+            now[v, 0] = 1.0
+    return now

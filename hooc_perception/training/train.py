@@ -1,0 +1,175 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+`hooc train`: from generic meshes and cameras to a MODEL folder, without looking at a scene.
+
+What a profile learns is data in PROFILES. Further parts that are learnt from synthetic
+scenes add a function to EXTRA_STEPS; each returns arrays that are stored with the classifier.
+"""
+
+from dataclasses import asdict, dataclass
+import json
+from pathlib import Path
+
+from hooc_perception.core.classify import FORMAT_VERSION, KIND_FUSED, KIND_PAPER
+from hooc_perception.core.config import Config
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.errors import HoocError
+from hooc_perception.models.derive import derive
+from hooc_perception.models.folder import save_model_folder
+from hooc_perception.models.mesh import load_mesh
+from hooc_perception.synthesis.training_scenes import PAPER, training_scenes
+from hooc_perception.training import fit_pixels
+from hooc_perception.training.fit_forest import fit, FitConfig
+from hooc_perception.training.fused_scenes import fused_table, FusedScenesConfig
+import joblib
+import numpy as np
+from tqdm import tqdm
+
+PROFILES = {
+    'paper': (fit_pixels.PixelFitConfig(),),
+    'best': (FusedScenesConfig(), FitConfig()),
+    'fast': (FusedScenesConfig(scenes=200), FitConfig(trees=24)),
+}
+
+
+@dataclass(frozen=True)
+class TrainingContext:
+    """
+    What a training step may read.
+
+    :ivar models: tuple of GenericModel; class id c is models[c - 1].
+    :ivar cameras: tuple of Camera of the set; `max_instances` as in SceneSet.
+    :ivar configs: the Config objects of the profile; `jobs` worker processes or threads.
+    :ivar classifier: arrays of the steps before.
+    """
+
+    models: tuple
+    cameras: tuple
+    max_instances: int
+    profile: str
+    seed: int
+    configs: tuple
+    jobs: int
+    progress: bool
+    classifier: dict
+
+    def bar(self, total, what, unit):
+        """Return a progress bar; call its `update(n)`."""
+        return tqdm(total=total, desc=what, unit=unit, disable=not self.progress)
+
+
+# Functions of a TrainingContext that return a dict of arrays (numbers or one string).
+EXTRA_STEPS = []
+
+
+def train(scene_set, out, profile='best', seed=0, progress=True, configs=None, jobs=0):
+    """
+    Train a model from a set's generic meshes and cameras, and write it as a MODEL folder.
+
+    :param scene_set: SceneSet; its scenes are never read.
+    :param out: folder to write.
+    :param configs: Config objects instead of the profile's own, for tests and experiments.
+    :param jobs: parallel workers, 0 = all cores; the result does not depend on it.
+    :return: the ModelFolder.
+    :raises HoocError: no categories, no cameras, an unknown profile, or an unreadable mesh.
+    """
+    if profile not in PROFILES:
+        raise HoocError(f'there is no profile {profile!r}; choose one of {", ".join(PROFILES)}')
+    if not scene_set.categories:
+        raise HoocError(f'{scene_set.path} lists no categories; name at least one in dataset.yaml')
+    if not scene_set.cameras:
+        raise HoocError(f'{scene_set.path} names no cameras; training needs the cameras\' layout')
+    models = generic_models(scene_set, seed, progress)
+    classifier = train_classifier(models, scene_set.cameras, profile, seed,
+                                  scene_set.max_instances, configs, jobs, progress)
+    return save_model_folder(Path(out), scene_set.name, models, classifier, profile, seed,
+                             scene_set.cameras, scene_set.max_instances)
+
+
+def generic_models(scene_set, seed, progress=False):
+    """Return the tuple of GenericModel of a set's categories, in class order."""
+    models = []
+    for index, category in enumerate(tqdm(scene_set.categories, desc='generic models',
+                                          unit='model', disable=not progress)):
+        mesh = load_mesh(category.mesh_path, category.scale)
+        models.append(derive(category.name, mesh, stage_rng(seed, 'derive', index)))
+    return tuple(models)
+
+
+def train_classifier(models, cameras, profile='best', seed=0, max_instances=0, configs=None,
+                     jobs=0, progress=False):
+    """Return the classifier's dict of arrays, extra steps included."""
+    configs = tuple(configs or PROFILES[profile])
+    context = TrainingContext(tuple(models), tuple(cameras), max_instances, profile, seed,
+                              configs, jobs or joblib.cpu_count(), progress, {})
+    step = _paper if isinstance(configs[0], fit_pixels.PixelFitConfig) else _fused
+    for run in (step, *EXTRA_STEPS):
+        context.classifier.update(run(context))
+    return dict(context.classifier)
+
+
+def _head(context, kind, held_out):
+    """Return the arrays that say what a classifier is and how it came about."""
+    settings = {type(c).__name__: {k: asdict(v) if isinstance(v, Config) else v
+                                   for k, v in vars(c).items()} for c in context.configs}
+    settings.update(profile=context.profile, seed=context.seed, **held_out)
+    return {'kind': np.uint8(kind), 'version': np.uint8(FORMAT_VERSION),
+            'classes': np.uint8(len(context.models)),
+            'settings': np.array(json.dumps(settings, sort_keys=True))}
+
+
+def _paper(context):
+    """Learn one multi-view forest a view (METHOD 1.1 and 1.2)."""
+    config, = context.configs
+    n_classes = len(context.models) + 1
+    pools = []
+    for stage, n, pixels in (
+            ('structure', config.structure_scenes, config.structure_pixels),
+            ('leaves', config.leaf_scenes, config.leaf_pixels)):
+        scenes = training_scenes(context.models, context.cameras, PAPER, context.seed, n,
+                                 stage=stage, jobs=context.jobs)
+        with context.bar(n, f'scenes for {stage}', 'scene') as bar:
+            pools.append(fit_pixels.pool(_counted(scenes, bar), n, pixels, config, context.seed,
+                                         stage))
+    arrays = {'views': np.uint8(len(context.cameras))}
+    with context.bar(config.trees * len(context.cameras), 'trees', 'tree') as bar:
+        for view in range(len(context.cameras)):
+            forest = fit_pixels.fit_view(*pools, view, n_classes, config, context.seed,
+                                         context.jobs, bar.update)
+            arrays.update(forest.arrays(f'view{view}_'))
+    return {**_head(context, KIND_PAPER, {}), **arrays}
+
+
+def _fused(context):
+    """Learn one forest over fused features, and how well it does on scenes it never saw."""
+    scenes, forest_config = context.configs
+    with context.bar(scenes.scenes, 'synthetic scenes', 'scene') as bar:
+        table = fused_table(context.models, context.cameras, scenes, context.seed,
+                            context.max_instances, context.jobs, bar.update)
+    kept = table.scene < scenes.scenes - max(1, scenes.scenes // 25)
+    with context.bar(forest_config.trees, 'trees', 'tree') as bar:
+        forest = fit(np.ascontiguousarray(table.binned[:, kept]), table.y[kept],
+                     len(context.models) + 1, table.cuts, forest_config,
+                     stage_rng(context.seed, 'fused forest'), context.jobs, bar.update)
+    held_out = {'held_out_accuracy': _accuracy(forest, table, ~kept)}
+    return {**_head(context, KIND_FUSED, held_out), 'probes': table.probes,
+            **forest.arrays('forest_')}
+
+
+def _accuracy(forest, table, rows):
+    """Return the share of held-out object pixels whose class is the most likely one."""
+    rows &= table.y > 0
+    if not rows.any():
+        return None
+    # Any value strictly inside of a bin takes the same branches as the original did.
+    edges = np.concatenate([table.cuts, np.full((len(table.cuts), 1), np.inf, np.float32)], 1)
+    x = np.take_along_axis(edges, table.binned[:, rows].astype(np.int64), axis=1).T
+    return round(float((forest.predict(x).argmax(1) == table.y[rows]).mean()), 4)
+
+
+def _counted(items, bar):
+    """Yield the items and advance a progress bar."""
+    for item in items:
+        yield item
+        bar.update(1)

@@ -14,6 +14,7 @@ That way no category has to be left out (the paper had to leave out dustpan and 
 """
 
 from hooc_perception.core.kernels import overlap as kernels
+from hooc_perception.core.memo import per_model
 import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
@@ -24,13 +25,14 @@ CELLS = 48
 BELIEVABLE = 0.75
 
 
-def occupancy(model, cells=CELLS):
+@per_model
+def occupancy(model):
     """
-    Return the (cells, cells, cells) bool grid over the bounding box of a GenericModel.
+    Return the (CELLS, CELLS, CELLS) bool grid over the bounding box of a GenericModel.
 
     Indices run along the model's x, y, z; a cell is True where its centre is inside.
     """
-    extents = np.maximum(model.extents, 1e-9)
+    cells, extents = CELLS, np.maximum(model.extents, 1e-9)
     vertices = np.ascontiguousarray((model.vertices / extents + 0.5) * cells)
     votes = np.zeros((cells, cells, cells), np.uint8)
     for axis in range(3):

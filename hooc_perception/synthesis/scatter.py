@@ -8,6 +8,7 @@ physical overlap. How close, the paper does not say; here they are packed as on 
 """
 
 from dataclasses import dataclass
+import zlib
 
 import fcl
 from hooc_perception.core.config import Config, param
@@ -54,6 +55,12 @@ class PlacedObject:
     size: np.ndarray
     vertices_world: np.ndarray
     faces: np.ndarray
+
+
+def models_key(models):
+    """Return a hashable key of what the meshes of a GenericModel sequence are."""
+    return tuple((m.name, zlib.crc32(np.ascontiguousarray(m.vertices)),
+                  zlib.crc32(np.ascontiguousarray(m.faces))) for m in models)
 
 
 class Scatterer:
@@ -138,7 +145,7 @@ class _Draft:
         self.turned = (model.vertices * scale) @ rotation.as_matrix().T
         self.low, self.high = self.turned.min(axis=0), self.turned.max(axis=0)
         self.circle = 0.5 * np.linalg.norm((self.high - self.low)[:2])
-        self.footprint = ConvexHull(self.turned[:, :2]).volume
+        self.footprint = ConvexHull(self.turned[:, :2], qhull_options='QJ').volume
         self.size = model.extents * scale
         self.body = fcl.CollisionObject(bvh, fcl.Transform(rotation.as_matrix(), np.zeros(3)))
 

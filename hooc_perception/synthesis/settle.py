@@ -3,7 +3,7 @@
 """Let objects come to rest on the table by physics (MuJoCo): stacked, leaning, in any pose."""
 
 from collections import OrderedDict
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import matrix_from_pose, transform
@@ -11,11 +11,12 @@ from hooc_perception.errors import HoocError
 from hooc_perception.models.mesh import closed
 from hooc_perception.synthesis.convex import convex_pieces
 from hooc_perception.synthesis.reshape import reshape
-from hooc_perception.synthesis.scatter import PlacedObject
+from hooc_perception.synthesis.scatter import models_key, PlacedObject
 import mujoco
 import numpy as np
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
+import trimesh
 
 # Household ware weighs about this much a litre of its own volume (plastic, wood, ceramics).
 DENSITY = 700.0
@@ -112,9 +113,9 @@ def _compile(bodies):
     for i, body in enumerate(bodies):
         node = spec.worldbody.add_body(pos=[3.0 * (i + 1), 0, -50])
         node.add_freejoint()
-        volumes = np.array([max(ConvexHull(p).volume, 1e-9) for p in body.pieces])
+        pieces, volumes = _weighty(body)
         mass = np.clip(DENSITY * volumes.sum(), 0.03, 3.0)
-        for k, piece in enumerate(body.pieces):
+        for k, piece in enumerate(pieces):
             name = f'{i}_{k}'
             spec.add_mesh(name=name, uservert=np.asarray(piece, np.float64).ravel(),
                           maxhullvert=32, inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX)
@@ -128,6 +129,17 @@ def _compile(bodies):
     drag[:, :3] = 0.3 * mass
     drag[:, 3:] = 5e-4 * mass
     return model
+
+
+def _weighty(body):
+    """Return (pieces, volumes (n,) m^3), slivers left out; a box where nothing remains."""
+    kept = [(p, volume) for p in body.pieces
+            if (volume := ConvexHull(p, qhull_options='QJ').volume) > 1e-9]
+    if not kept:
+        half = np.maximum(0.5 * np.ptp(body.vertices, axis=0), 0.002)
+        corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * half
+        kept = [(corners, 8 * half.prod())]
+    return [p for p, _ in kept], np.array([volume for _, volume in kept])
 
 
 def _release(model, data, bodies, i, released, radius, rng, config):
@@ -166,7 +178,7 @@ def _release(model, data, bodies, i, released, radius, rng, config):
 def _footprint(body):
     """Return the area that a body covers when it lies on its broadest side, m^2."""
     broad = np.argsort(np.ptp(body.vertices, axis=0))[1:]
-    return ConvexHull(body.vertices[:, broad]).volume
+    return ConvexHull(body.vertices[:, broad], qhull_options='QJ').volume
 
 
 def _pose(data, i):
@@ -211,7 +223,6 @@ class BodyMaker:
     def pieces(self, index):
         """Return the cached convex pieces of models[index]."""
         if index not in self._pieces:
-            import trimesh
             model = self.models[index]
             solid = closed(trimesh.Trimesh(model.vertices, model.faces, process=False))
             self._pieces[index] = convex_pieces(solid)
@@ -229,6 +240,13 @@ class BodyMaker:
                     model.rest_rotations)
 
 
+def varied(config, rng):
+    """Return a copy of the config laid down in another manner: tidier, or more of a heap."""
+    return replace(config, upright=float(rng.uniform(0.3, 0.9)),
+                   crowding=float(config.crowding * np.exp(rng.normal(0, 0.3))),
+                   places=int(rng.integers(1, 5)), large_first=bool(rng.random() < 0.5))
+
+
 _MAKERS = OrderedDict()
 
 
@@ -236,13 +254,15 @@ def settled_models(models, rng, scatter, strength, config=SettleConfig()):
     """
     Return a settled arrangement of a random subset of models, a list of PlacedObject.
 
+    Each arrangement is laid down in a manner of its own; see `varied`.
+
     :param scatter: ScatterConfig, gives the range of counts and the repeats.
     :param strength: how far the objects depart from the generic shapes.
     :raises HoocError: where there are no models.
     """
     if not models:
         raise HoocError('a settled scene needs at least one model, but there are none')
-    key = tuple((m.name, len(m.vertices), tuple(m.extents)) for m in models)
+    key = models_key(models)
     if key not in _MAKERS:
         while len(_MAKERS) >= 4:
             _MAKERS.popitem(last=False)
@@ -251,4 +271,4 @@ def settled_models(models, rng, scatter, strength, config=SettleConfig()):
     count = int(rng.integers(scatter.objects_low, scatter.objects_high + 1))
     chosen = rng.permutation(np.tile(np.arange(len(models)), scatter.repeats))[:count] + 1
     bodies = [maker.body(int(c), rng, strength) for c in chosen]
-    return settle(bodies, rng, config)
+    return settle(bodies, rng, varied(config, rng))

@@ -9,9 +9,10 @@ from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import RectifiedView
 from hooc_perception.errors import HoocError
+from hooc_perception.synthesis.reshape import reshape_placed
 from hooc_perception.synthesis.rigs import jittered_rig, random_rig, undistorted
 from hooc_perception.synthesis.room import draw_room, RoomConfig
-from hooc_perception.synthesis.scatter import ScatterConfig, Scatterer
+from hooc_perception.synthesis.scatter import models_key, ScatterConfig, Scatterer
 from hooc_perception.synthesis.sensor import miscalibrated, randomised, sense, SensorConfig
 import joblib
 import numpy as np
@@ -109,7 +110,8 @@ def training_scene(models, cameras, rng, config=TrainingConfig(), scatterer=None
     elif objects is None:
         objects = (scatterer or Scatterer(models, config.scatter)).scene(rng)
         if config.reshape_strength > 0:
-            objects = _reshaped_in_place(objects, rng, config.reshape_strength)
+            objects = [reshape_placed(o, rng, config.reshape_strength,
+                                      models[o.category - 1].symmetry) for o in objects]
     if config.rig == 'random':
         cameras = random_rig(cameras, rng, config.cameras_low, config.cameras_high)
     elif config.rig == 'jittered':
@@ -121,7 +123,7 @@ def training_scene(models, cameras, rng, config=TrainingConfig(), scatterer=None
 def training_scenes(models, cameras, config=TrainingConfig(), seed=0, n=500, progress=False,
                     stage='training', jobs=1):
     """
-    Yield n TrainingScenes; scene k depends on (seed, stage, k) alone.
+    Yield n TrainingScenes; with given settings, scene k depends on (seed, stage, k) alone.
 
     :param stage: name of the random stream: other scenes, such as those that fill the
         leaves of a forest, take another name.
@@ -134,9 +136,10 @@ def training_scenes(models, cameras, config=TrainingConfig(), seed=0, n=500, pro
     parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
     scenes = parallel(run(tuple(models), tuple(cameras), config, seed, stage, start,
                           min(start + group, n)) for start in starts)
-    for batch in tqdm(scenes, total=len(starts), disable=not progress, unit='batch',
-                      desc='synthetic scenes'):
-        yield from batch
+    with tqdm(total=n, disable=not progress, unit='scene', desc='synthetic scenes') as bar:
+        for batch in scenes:
+            bar.update(len(batch))
+            yield from batch
 
 
 _SCATTERERS = {}
@@ -144,7 +147,7 @@ _SCATTERERS = {}
 
 def _scatterer(models, config):
     """Return this process's Scatterer of the models: collision shapes are built once."""
-    key = (tuple((m.name, len(m.vertices), tuple(m.extents)) for m in models), config)
+    key = (models_key(models), config)
     if key not in _SCATTERERS:
         _SCATTERERS.clear()
         _SCATTERERS[key] = Scatterer(models, config)
@@ -167,9 +170,3 @@ def _settled(models, rng, config):
     # Imported late: physics is not needed for the paper's scenes.
     from hooc_perception.synthesis.settle import settled_models
     return settled_models(models, rng, config.scatter, config.reshape_strength)
-
-
-def _reshaped_in_place(objects, rng, strength):
-    """Return scattered objects with perturbed shapes, still standing on the table."""
-    from hooc_perception.synthesis.reshape import reshape_placed
-    return [reshape_placed(o, rng, strength) for o in objects]

@@ -17,6 +17,7 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rclpy.parameter import Parameter
 
 _INT64 = 2 ** 63 - 1
 
@@ -125,3 +126,11 @@ def _checked(section, config, values):
         text = str(error)
         raise HoocError(text.replace('parameter ', f'parameter {section}.', 1)
                         if section else text) from error
+
+
+def parameter_message(name, value):
+    """Return the rcl_interfaces/Parameter of a name and a Python value; () is a text list."""
+    kind = Parameter.Type.STRING_ARRAY if value in ((), []) else None
+    value = list(value) if isinstance(value, tuple) else value
+    return (Parameter(name, kind, value) if kind else Parameter(name, value=value)
+            ).to_parameter_msg()

@@ -1,0 +1,51 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`hooc replay`: a bag as live cameras."""
+
+from pathlib import Path
+
+from hooc_perception.errors import HoocError
+
+HELP = ('Play a bag as live cameras under /hooc. Waits until somebody listens to every camera, '
+        'then sends the images as they were recorded, with stamps of now.')
+
+
+def add_arguments(parser):
+    """Declare the arguments of `hooc replay`."""
+    parser.add_argument('bag', type=Path, metavar='BAG')
+    parser.add_argument('--rate', type=float, default=1.0, metavar='R',
+                        help='speed; 0 = as fast as the chain answers (default: %(default)g)')
+    parser.add_argument('--loop', action='store_true', help='start again at the end')
+    parser.add_argument('--wait', type=float, default=30.0, metavar='S',
+                        help='give up when nobody listens after so long (default: %(default)g s)')
+    parser.add_argument('--namespace', default='/hooc', help='default: %(default)s')
+
+
+def run(args):
+    """Run the command; return the exit code."""
+    import json
+
+    from hooc_perception.replay.bag_reader import BagScene
+    from hooc_perception.ros.qos import qos
+    from hooc_perception.supervisor.supervisor import REPLAY, Supervisor
+    from std_msgs.msg import String
+    if not 0 <= args.rate <= 100 or not args.wait > 0:
+        raise HoocError('--rate must be from 0 to 100 and --wait positive')
+    bag = BagScene(args.bag)
+    parameters = {REPLAY: {'bag': str(args.bag.resolve()), 'rate': args.rate, 'loop': args.loop,
+                           'match_timeout_s': args.wait}}
+    with Supervisor((REPLAY,), parameters, args.namespace) as supervisor:
+        status = {}
+        supervisor.node.create_subscription(
+            String, 'replay/status', lambda message: status.update(json.loads(message.data)),
+            qos('replay/status'))
+        supervisor.bring_up()
+        print(f'playing {bag.name}: cameras {", ".join(c.name for c in bag.cameras)}', flush=True)
+        while status.get('state') not in ('finished', 'failed'):
+            supervisor.spin(0.2)
+        if status['state'] == 'failed':
+            supervisor.wait_a_moment()
+            raise HoocError(supervisor.processes[REPLAY].last_words())
+        # Whoever has not taken the last images yet can still get them.
+        supervisor.wait_a_moment(1.0)
+    print(f'{status["images"]} images sent')

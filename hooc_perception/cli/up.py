@@ -1,0 +1,63 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`hooc up`: the nodes alone, for live cameras."""
+
+from pathlib import Path
+
+from hooc_perception.errors import HoocError
+
+HELP = ('Start the four nodes of the chain for live cameras and keep them up until '
+        'interrupted. Cameras publish <camera>/depth/image_raw and camera_info under /hooc; '
+        'answers come on /hooc/objects/poses and /hooc/objects/attributes.')
+
+
+def add_arguments(parser):
+    """Declare the arguments of `hooc up`."""
+    parser.add_argument('--model', type=Path, required=True, metavar='MODEL',
+                        help='model folder that hooc train wrote')
+    parser.add_argument('--cameras', type=Path, metavar='cameras.yaml',
+                        help='names and poses of the cameras; without it, names come from the '
+                             'model and poses from <camera>/extrinsics or /tf_static')
+    parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
+                        help='default: the one the model was trained for')
+    parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
+    parser.add_argument('--namespace', default='/hooc', help='default: %(default)s')
+    parser.add_argument('--params', type=Path, metavar='FILE',
+                        help='YAML of node parameters, as config/perception.yaml')
+    parser.add_argument('--quiet', action='store_true', help='show only warnings and errors')
+
+
+def run(args):
+    """Run the command until it is interrupted."""
+    from hooc_perception.models.folder import load_model_folder
+    from hooc_perception.supervisor.supervisor import CHAIN, Supervisor
+    if args.seed < 0:
+        raise HoocError('--seed must not be negative')
+    model = load_model_folder(args.model)
+    stage = {'model': str(args.model.resolve()), 'profile': args.profile or model.profile,
+             'seed': args.seed}
+    parameters = {name: dict(stage) for name in CHAIN}
+    if args.cameras:
+        poses = camera_poses(args.cameras)
+        for name in CHAIN:
+            parameters[name]['cameras'] = tuple(poses)
+        parameters['ingestion_node'].update(
+            {f'extrinsics.{name}': pose for name, pose in poses.items()})
+    with Supervisor(CHAIN, parameters, args.namespace, verbose=not args.quiet,
+                    params_file=args.params) as supervisor:
+        supervisor.bring_up()
+        print(f'the nodes are up; objects come on {args.namespace.rstrip("/")}/objects/poses; '
+              'end with Ctrl-C', flush=True)
+        while True:
+            supervisor.spin(0.5)
+
+
+def camera_poses(path):
+    """Return {camera: [x, y, z, qx, qy, qz, qw]} of a cameras.yaml."""
+    from hooc_perception.core.geometry import pose_from_matrix
+    from hooc_perception.scenes.camera_files import load_cameras
+    poses = {}
+    for name, camera in load_cameras(path).items():
+        translation, rotation = pose_from_matrix(camera.T_world_camera)
+        poses[name] = [*translation.tolist(), *rotation.tolist()]
+    return poses

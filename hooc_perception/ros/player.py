@@ -1,0 +1,84 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""When each recorded image is due, and with which stamp: pure, so that it can be tested."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Due:
+    """One image to publish: of which camera, its message, the stamp to give it."""
+
+    camera: str
+    stamp_ns: int
+    message: object
+
+
+class Player:
+    """
+    Pace recorded images like live cameras.
+
+    :param images: callable that returns a fresh iterator of (camera, stamp_ns, message) in
+        the order of time.
+    :param rate: 1 = as recorded, 2 = twice as fast; 0 = a frame set each time `released()` is
+        called, as fast as the chain answers.
+    :param restamp: True gives stamps of now, with the recorded distances (by `rate`).
+    :param min_gap_ns: at least this between two images: large messages sent back to back are
+        what gets lost.
+    """
+
+    def __init__(self, images, rate=1.0, restamp=True, loop=False, min_gap_ns=5_000_000):
+        """Start with the first image at the first call of `due`."""
+        self._images, self.rate, self.restamp, self.loop = images, rate, restamp, loop
+        self._min_gap_ns = min_gap_ns
+        self._iterator, self._next = iter(images()), None
+        self._start = self._first = None    # node time and recorded stamp of the first image
+        self._last_time = None
+        self._in_set = set()                # cameras sent since the last release
+        self.set_stamp_ns = 0               # given to the first image of the latest set
+        self._held = False
+        self.finished, self.published = False, 0
+        self._advance()
+
+    def due(self, now_ns):
+        """Return the Due image, or None while there is none; call often."""
+        if self.finished or self._held:
+            return None
+        if self._last_time is not None and now_ns - self._last_time < self._min_gap_ns:
+            return None
+        camera, stamp, message = self._next
+        if self._start is None:
+            self._start, self._first = now_ns, stamp
+        when = self._start + round((stamp - self._first) / (self.rate or 1.0))
+        if self.rate and now_ns < when:
+            return None
+        if not self.rate:
+            if camera in self._in_set:
+                self._held = True
+                return None
+            # Distances as recorded from the set's first image on.
+            if not self._in_set:
+                self._start, self._first, when = now_ns, stamp, now_ns
+                self.set_stamp_ns = when if self.restamp else stamp
+            self._in_set.add(camera)
+        self._last_time, self.published = now_ns, self.published + 1
+        self._advance()
+        return Due(camera, when if self.restamp else stamp, message)
+
+    @property
+    def waits_for_release(self):
+        """Return whether a whole set is out and `released()` is awaited (rate 0)."""
+        return self._held
+
+    def released(self):
+        """Let the next frame set go (rate 0)."""
+        self._held = False
+        self._in_set.clear()
+
+    def _advance(self):
+        self._next = next(self._iterator, None)
+        if self._next is None and self.loop and self.published:
+            self._iterator = iter(self._images())
+            self._next = next(self._iterator)
+            self._start = None
+        self.finished = self._next is None

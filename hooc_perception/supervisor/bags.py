@@ -1,0 +1,87 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Play bags through the nodes, one after the other, and bring the answers back."""
+
+from hooc_perception.errors import HoocError
+from hooc_perception.supervisor.collector import Collector
+from hooc_perception.supervisor.supervisor import CHAIN, REPLAY
+
+MATCH_TIMEOUT_S = 30.0
+# Ingestion and the collector listen to every image.
+LISTENERS = 2
+
+
+class BagRunner:
+    """
+    Play bags through the nodes of a running Supervisor, which stay up in between.
+
+    :param supervisor: Supervisor of CHAIN and REPLAY, entered.
+    :param timeout_s: how long one scene may take from its last image on.
+    """
+
+    def __init__(self, supervisor, timeout_s=120.0):
+        """Listen."""
+        self._supervisor, self._timeout_s = supervisor, timeout_s
+        self._collector = Collector(supervisor.node)
+        self._rig = None
+
+    def play(self, bag):
+        """
+        Return the Answer to the last frame set of a bag.
+
+        :param bag: BagScene.
+        :raises HoocError: where a node refuses, dies or does not answer in time.
+        """
+        supervisor, collector = self._supervisor, self._collector
+        self._set_up(bag)
+        collector.expect([camera.name for camera in bag.cameras])
+        supervisor.set_parameters(REPLAY, {'bag': str(bag.path)})
+        began = supervisor.node.get_clock().now().nanoseconds
+        supervisor.bring_up([REPLAY])
+        try:
+            self._wait(lambda: collector.replay.get('state') in ('finished', 'failed'), began,
+                       MATCH_TIMEOUT_S + self._timeout_s + _length_s(bag),
+                       f'{bag.name}: the bag could not be played to its end')
+            if collector.replay['state'] == 'failed':
+                supervisor.wait_a_moment()
+                raise HoocError(supervisor.processes[REPLAY].last_words())
+            self._wait(lambda: len(collector.stamps) == len(bag.cameras), began, 10.0,
+                       f'{bag.name}: not every camera of the bag was heard')
+            return self._wait(
+                lambda: collector.answer(min(collector.stamps.values())), began, self._timeout_s,
+                f'{bag.name}: no objects came within {self._timeout_s:g} s of the last image; '
+                'give it more time with --timeout, or a faster profile')
+        finally:
+            supervisor.bring_down([REPLAY])
+
+    def _set_up(self, bag):
+        """Bring the chain up for the bag's rig, anew where it differs from the last one."""
+        info = bag.info
+        rig = {'cameras': tuple(camera.name for camera in bag.cameras),
+               'target_frame': info['world_frame'] or 'table'}
+        limit = int(info['max_instances'])
+        if (rig, limit) == self._rig:
+            return
+        if self._rig is not None:
+            self._supervisor.bring_down(CHAIN)
+        for name in CHAIN:
+            self._supervisor.set_parameters(
+                name, {**rig, 'max_instances': limit} if name == 'parsing_node' else rig)
+        self._supervisor.bring_up(CHAIN)
+        self._rig = rig, limit
+
+    def _wait(self, condition, began_ns, timeout_s, complaint):
+        """Wait, but no longer once a node reports an error."""
+        def settled():
+            value = condition()
+            if not value:
+                for when, sentence in self._collector.errors:
+                    if when > began_ns:
+                        raise HoocError(sentence)
+            return value
+        return self._supervisor.wait(settled, timeout_s, complaint)
+
+
+def _length_s(bag):
+    """Return how many seconds a bag lasts at most, by its number of images at 1 Hz."""
+    return max(bag.topics[topic].count for topic in bag.depth_topics.values())

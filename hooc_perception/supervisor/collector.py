@@ -1,0 +1,128 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Listen to what the nodes say about a played bag; written as any user could write it."""
+
+from dataclasses import dataclass
+import json
+
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import PoseArray
+from hooc_perception.core.types import Energy, ParsedScene, PixelProbabilities
+from hooc_perception.ros.conversions import nanoseconds
+from hooc_perception.ros.point_clouds import cloud_rows
+from hooc_perception.ros.qos import qos
+from hooc_perception.ros.stage_messages import (
+    candidates_from_messages,
+    probabilities_from_message,
+)
+from sensor_msgs.msg import Image, PointCloud2
+from std_msgs.msg import String
+
+
+@dataclass(frozen=True)
+class Answer:
+    """
+    What the nodes found for one frame set.
+
+    :ivar seconds: from the last depth image's arrival to the objects' publication.
+    :ivar probabilities: PixelProbabilities, None if they were not heard.
+    """
+
+    stamp_ns: int
+    parsed: ParsedScene
+    seconds: float
+    probabilities: PixelProbabilities | None
+
+
+_PARTS = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
+          'scene/summary': String, 'candidates/poses': PoseArray,
+          'candidates/attributes': PointCloud2, 'pixels/probabilities': PointCloud2}
+
+
+class Collector:
+    """
+    Subscribe to the raw images (for their arrival) and to the answers.
+
+    :param node: rclpy Node in the namespace of the chain.
+    """
+
+    def __init__(self, node):
+        """Subscribe to all but the cameras."""
+        self._node, self._images = node, []
+        for topic, kind in _PARTS.items():
+            node.create_subscription(kind, topic, self._taker(topic), qos(topic))
+        node.create_subscription(String, 'replay/status', self._on_status, qos('replay/status'))
+        node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+        self.expect(())
+
+    def expect(self, cameras):
+        """Forget the last bag; listen to these cameras."""
+        for subscription in self._images:
+            self._node.destroy_subscription(subscription)
+        self._parts = {topic: {} for topic in _PARTS}
+        self._published = {}        # stamp -> ns of the publication of objects/poses
+        self.stamps = {}            # camera -> stamp of its latest image
+        self._arrived = {}          # stamp of an image -> ns of its latest arrival
+        self.replay, self.errors = {}, []
+        self._images = [self._node.create_subscription(
+            Image, f'{camera}/depth/image_raw', self._image_taker(camera),
+            qos('<camera>/depth/image_raw')) for camera in cameras]
+
+    def _image_taker(self, camera):
+        def take(message, info):
+            stamp = nanoseconds(message.header.stamp)
+            self.stamps[camera] = stamp
+            self._arrived[stamp] = max(self._arrived.get(stamp, 0), info['received_timestamp'])
+        return take
+
+    def _taker(self, topic):
+        def take(message, info):
+            if topic == 'scene/summary':
+                message = json.loads(message.data)
+                stamp = message['stamp_ns']
+            else:
+                stamp = nanoseconds(message.header.stamp)
+            self._parts[topic][stamp] = message
+            while len(self._parts[topic]) > 8:
+                del self._parts[topic][min(self._parts[topic])]
+            if topic == 'objects/poses':
+                self._published[stamp] = info['source_timestamp']
+        return take
+
+    def _on_status(self, message):
+        self.replay = json.loads(message.data)
+
+    def _on_diagnostics(self, message):
+        for status in message.status:
+            if status.level == DiagnosticStatus.ERROR:
+                self.errors.append((nanoseconds(message.header.stamp),
+                                    f'{status.name}: {status.message}'))
+
+    def answer(self, stamp_ns):
+        """Return the Answer to the frame set of a stamp, None while parts are missing."""
+        poses, attributes, summary = (self._parts[topic].get(stamp_ns) for topic in (
+            'objects/poses', 'objects/attributes', 'scene/summary'))
+        if poses is None or attributes is None or summary is None:
+            return None
+        found = candidates_from_messages(poses, attributes)
+        rows = cloud_rows(attributes)
+        pool = self._pool(stamp_ns)
+        if pool is None or len(pool) != summary['candidates']:
+            pool = found if pool is None else pool
+        energy = summary['energy']
+        parsed = ParsedScene(
+            found, Energy(energy['depth'], energy['probability'], energy['overlap']),
+            rows['visible_ratio'].copy(), rows['residual_m'].copy(), rows['energy_delta'].copy(),
+            rows['n_views'].copy(), pool, converged=summary['converged'],
+            seconds=summary['seconds'])
+        probabilities = self._parts['pixels/probabilities'].get(stamp_ns)
+        arrived = max((t for s, t in self._arrived.items() if s >= stamp_ns), default=0)
+        return Answer(stamp_ns, parsed, max(0.0, (self._published[stamp_ns] - arrived) * 1e-9),
+                      probabilities and probabilities_from_message(probabilities))
+
+    def _pool(self, stamp_ns):
+        poses = self._parts['candidates/poses'].get(stamp_ns)
+        attributes = self._parts['candidates/attributes'].get(stamp_ns)
+        if poses is None or attributes is None:
+            return None
+        return candidates_from_messages(poses, attributes)

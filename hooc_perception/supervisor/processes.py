@@ -1,0 +1,87 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""A node as a process: start it, pass on what it says, notice its end, end it."""
+
+from collections import deque
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+from hooc_perception.supervisor.environment import child_environment
+
+_QUIET = ('[INFO]', '[DEBUG]')
+
+
+class NodeProcess:
+    """
+    One node in a process and a process group of its own.
+
+    :ivar name: of the node, which is also that of its module in hooc_perception.nodes.
+    """
+
+    def __init__(self, name, params_files, namespace, verbose=False, module=None):
+        """
+        Start the process.
+
+        :param params_files: YAML files of parameters, the later win.
+        :param verbose: pass on everything; else only warnings and errors.
+        :param module: another module to run, in tests.
+        """
+        self.name, self._verbose = name, verbose
+        self._lines = deque(maxlen=40)
+        # A group of its own: Ctrl-C reaches the supervisor only, which ends the nodes in order.
+        self._process = subprocess.Popen(
+            [sys.executable, '-m', module or f'hooc_perception.nodes.{name}', '--ros-args',
+             '-r', f'__ns:={namespace}',
+             *(word for file in params_files for word in ('--params-file', str(file)))],
+            env=child_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT, text=True, errors='replace', start_new_session=True)
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
+
+    @property
+    def pid(self):
+        """Return the process id."""
+        return self._process.pid
+
+    def exit_code(self):
+        """Return the exit code, None while it runs."""
+        return self._process.poll()
+
+    def last_words(self):
+        """Return the last error that it printed, or its last line."""
+        self._reader.join(0.5 if self.exit_code() is not None else 0)
+        lines = [line for line in self._lines if line]
+        errors = [line for line in lines if line.startswith(('[ERROR]', '[FATAL]'))]
+        return (errors or lines or ['it said nothing'])[-1]
+
+    def ask_to_stop(self):
+        """Send SIGINT, which rclpy turns into an orderly end."""
+        self._signal(signal.SIGINT)
+
+    def stop(self, deadline):
+        """
+        Make sure that it has ended.
+
+        :param deadline: time.monotonic() until which it may take its time.
+        """
+        try:
+            self._process.wait(max(0.0, deadline - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            self._signal(signal.SIGKILL)
+            self._process.wait(5)
+        self._reader.join(1)
+
+    def _signal(self, number):
+        if self._process.poll() is None:
+            self._process.send_signal(number)
+
+    def _read(self):
+        for line in self._process.stdout:
+            line = line.rstrip()
+            self._lines.append(line)
+            if line and (self._verbose or not line.startswith(_QUIET)):
+                print(f'[{self.name}] {line}', file=sys.stderr, flush=True)
+        self._process.stdout.close()

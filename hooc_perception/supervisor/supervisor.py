@@ -1,0 +1,209 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bring the nodes up as separate processes, watch them, leave nothing behind."""
+
+from pathlib import Path
+import shutil
+import signal
+import tempfile
+import time
+
+from hooc_perception.errors import HoocError
+from hooc_perception.ros.parameters import parameter_message
+from hooc_perception.supervisor.environment import isolate, use_large_segments
+from hooc_perception.supervisor.processes import NodeProcess
+from lifecycle_msgs.msg import State, Transition
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import SetParametersAtomically
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
+import yaml
+
+CHAIN = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node')
+REPLAY = 'replay_node'
+STOP_GRACE_S = 5.0
+START_TIMEOUT_S = 60.0
+# Loading a model and compiling for the first time take long on a small machine.
+TRANSITION_TIMEOUT_S = 300.0
+SET_TIMEOUT_S = 10.0
+
+
+class Supervisor:
+    """
+    Use as a context manager: the nodes live inside of the `with` block.
+
+    :ivar node: rclpy Node of this process, for endpoints of the caller.
+    """
+
+    def __init__(self, names=CHAIN, parameters=None, namespace='/hooc', isolated=False,
+                 verbose=False, params_file=None, modules=None):
+        """
+        Take note of what to start.
+
+        :param parameters: {node name: {parameter: value}}.
+        :param isolated: keep apart from all other ROS traffic.
+        :param params_file: YAML of the user; `parameters` win over it.
+        :param modules: {node name: module}, in tests.
+        """
+        self.names, self._parameters, self.namespace = tuple(names), parameters or {}, namespace
+        self._isolated, self._verbose, self._modules = isolated, verbose, modules or {}
+        self._params_file = Path(params_file) if params_file else None
+        if self._params_file and not self._params_file.is_file():
+            raise HoocError(f'{params_file}: there is no such file of parameters')
+        self.processes, self._clients, self._claim, self._folder = {}, {}, None, None
+        self.node = None
+
+    def __enter__(self):
+        """Start the processes and wait until all of them can be talked to."""
+        self._old_handlers = {}
+        try:
+            for number in (signal.SIGTERM, signal.SIGHUP):
+                self._old_handlers[number] = signal.signal(number, _exit_by_signal)
+        except ValueError:
+            pass    # not in the main thread: whoever is there handles signals
+        try:
+            self._start()
+        except BaseException:
+            self.__exit__()
+            raise
+        return self
+
+    def __exit__(self, *_):
+        """End all processes, whatever happened."""
+        try:
+            for process in self.processes.values():
+                process.ask_to_stop()
+        finally:
+            deadline = time.monotonic() + STOP_GRACE_S
+            while self.processes:
+                name = next(iter(self.processes))
+                try:
+                    self.processes[name].stop(deadline)
+                except KeyboardInterrupt:
+                    deadline = 0.0      # asked again: no more patience, but still all of them
+                    continue
+                del self.processes[name]
+            if self.node is not None:
+                self.node.destroy_node()
+                rclpy.try_shutdown(context=self._context)
+            if self._folder:
+                shutil.rmtree(self._folder, ignore_errors=True)
+            if self._claim:
+                self._claim.close()
+            for number, handler in self._old_handlers.items():
+                signal.signal(number, handler)
+
+    def _start(self):
+        if self._isolated:
+            self._claim = isolate()
+        use_large_segments(len(self.names) + 1)
+        self._folder = tempfile.mkdtemp(prefix='hooc-')
+        for name in self.names:
+            path = Path(self._folder, f'{name}.yaml')
+            path.write_text(yaml.safe_dump({'/**': {'ros__parameters': {
+                k: list(v) if isinstance(v, tuple) else v
+                for k, v in self._parameters.get(name, {}).items() if v not in ((), [], None)}}}),
+                encoding='utf-8')
+            files = [self._params_file] * bool(self._params_file) + [path]
+            self.processes[name] = NodeProcess(name, files, self.namespace, self._verbose,
+                                               self._modules.get(name))
+        self._context = rclpy.Context()
+        # Signals are ours: rclpy would only shut its context down and leave the nodes.
+        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        self.node = rclpy.create_node('hooc_supervisor', namespace=self.namespace,
+                                      context=self._context)
+        self._executor = SingleThreadedExecutor(context=self._context)
+        self._executor.add_node(self.node)
+        for name in self.names:
+            client = self._client(name, ChangeState, 'change_state')
+            self.wait(client.service_is_ready, START_TIMEOUT_S,
+                      f'{name} does not answer {START_TIMEOUT_S:g} s after its start')
+
+    # Talking to the nodes.
+
+    def spin(self, seconds=0.05):
+        """Serve callbacks for a moment; raise HoocError where a node has died."""
+        self._executor.spin_once(timeout_sec=seconds)
+        self.check()
+
+    def check(self):
+        """Raise HoocError where a node has died."""
+        for name, process in self.processes.items():
+            code = process.exit_code()
+            if code is not None:
+                raise HoocError(f'{name} ended unexpectedly (exit code {code}): '
+                                f'{process.last_words()}')
+
+    def wait(self, condition, timeout_s, complaint):
+        """
+        Serve callbacks until `condition()`; return its value.
+
+        :raises HoocError: `complaint` after `timeout_s`, or where a node has died.
+        """
+        deadline = time.monotonic() + timeout_s
+        while not (value := condition()):
+            if time.monotonic() > deadline:
+                raise HoocError(complaint)
+            self.spin()
+        return value
+
+    def bring_up(self, names=None):
+        """Configure and activate nodes, all of them at the same time."""
+        self.change(names or self.names, Transition.TRANSITION_CONFIGURE, 'configured')
+        self.change(names or self.names, Transition.TRANSITION_ACTIVATE, 'activated')
+
+    def bring_down(self, names=None):
+        """Deactivate nodes and have them forget what they built."""
+        names = names or self.names
+        self.change([n for n in names if self.state(n) == State.PRIMARY_STATE_ACTIVE],
+                    Transition.TRANSITION_DEACTIVATE, 'deactivated')
+        self.change([n for n in names if self.state(n) == State.PRIMARY_STATE_INACTIVE],
+                    Transition.TRANSITION_CLEANUP, 'cleaned up')
+
+    def change(self, names, transition, done):
+        """Have nodes make one lifecycle transition; HoocError with the reason of the first."""
+        request = ChangeState.Request(transition=Transition(id=transition))
+        futures = {name: self._client(name, ChangeState, 'change_state').call_async(request)
+                   for name in names}
+        for name, future in futures.items():
+            self.wait(future.done, TRANSITION_TIMEOUT_S,
+                      f'{name} could not be {done} within {TRANSITION_TIMEOUT_S:g} s')
+            if not future.result().success:
+                # The reason comes through a pipe and may be a moment behind.
+                self.wait_a_moment()
+                raise HoocError(f'{name} could not be {done}: '
+                                f'{self.processes[name].last_words()}')
+
+    def state(self, name):
+        """Return the lifecycle state's id of a node."""
+        future = self._client(name, GetState, 'get_state').call_async(GetState.Request())
+        self.wait(future.done, SET_TIMEOUT_S, f'{name} does not answer')
+        return future.result().current_state.id
+
+    def set_parameters(self, name, values):
+        """Set parameters of one node, all or none; HoocError with the node's reason."""
+        client = self._client(name, SetParametersAtomically, 'set_parameters_atomically')
+        request = SetParametersAtomically.Request(
+            parameters=[parameter_message(*item) for item in values.items()])
+        self.wait(client.service_is_ready, SET_TIMEOUT_S, f'{name} does not answer')
+        future = client.call_async(request)
+        self.wait(future.done, SET_TIMEOUT_S, f'{name} does not answer')
+        if not future.result().result.successful:
+            raise HoocError(f'{name}: {future.result().result.reason}')
+
+    def wait_a_moment(self, seconds=0.3):
+        """Serve callbacks for so long."""
+        deadline = time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            self.spin()
+
+    def _client(self, name, kind, service):
+        key = name, service
+        if key not in self._clients:
+            self._clients[key] = self.node.create_client(kind, f'{name}/{service}')
+        return self._clients[key]
+
+
+def _exit_by_signal(number, _):
+    raise SystemExit(128 + number)

@@ -85,7 +85,7 @@ def _scenes(folder, categories, info_file, info):
     truths = files.read_json(truth_file) if truth_file.is_file() else {}
     for key in shots:
         if not key.isdecimal():
-            raise HoocError(f'{camera_file}: the image id {key!r:.40} is not a number; '
+            raise HoocError(f'{camera_file}: the image id {files.shown(key)} is not a number; '
                             'correct it')
     shared, scenes = [], []
     for key in sorted(shots, key=int):
@@ -136,9 +136,9 @@ def _truth(truths, keys, cameras, file, categories, info_file, info):
         where = f'{file}: {keys[best]}[{i}]'
         item = files.mapping(item, where)
         obj_id = files.required(item, 'obj_id', where)
-        if obj_id not in categories:
-            raise HoocError(f'{where} obj_id is {obj_id!r:.40}, but there is no model '
-                            f'obj_{obj_id:>06}.ply; add the model or correct the id')
+        if not isinstance(obj_id, int) or obj_id not in categories:
+            raise HoocError(f'{where} obj_id is {files.shown(obj_id)}, but no file models/obj_'
+                            '<6 digits>.ply has this id; add the model or correct the id')
         T_camera_model = _pose(item, 'cam_R_m2c', 'cam_t_m2c', where)
         centre, size = _box(info, obj_id, info_file)
         T_model_centre = np.eye(4)

@@ -82,7 +82,7 @@ def intrinsics(value, width, height, where):
 def distortion(value, model, where):
     """Return the coefficients, padded to the model's full length."""
     if model not in COEFFICIENTS:
-        raise HoocError(f'{where} distortion_model is {model!r:.60}; '
+        raise HoocError(f'{where} distortion_model is {files.shown(model)}; '
                         f'use one of {", ".join(COEFFICIENTS)}')
     D = files.numbers(value, None, f'{where} D')
     if len(D) not in (0, *COEFFICIENTS[model]):

@@ -11,6 +11,7 @@ import math
 import os
 from pathlib import Path
 import re
+import reprlib
 import struct
 import tempfile
 import zlib
@@ -21,8 +22,10 @@ from hooc_perception.errors import HoocError
 import numpy as np
 import yaml
 
+MAX_YAML_BYTES = 8 << 20
+MAX_YAML_DEPTH = 32
 # BOP's scene_gt.json of a thousand images has some ten megabytes.
-MAX_TEXT_BYTES = 64 << 20
+MAX_JSON_BYTES = 64 << 20
 MAX_PNG_BYTES = 64 << 20
 MAX_SIDE = 8192
 _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
@@ -48,10 +51,14 @@ def read_bytes(path, limit):
 
 def read_yaml(path):
     """Return the mapping that a YAML file holds; tags that make objects are refused."""
-    text = read_bytes(path, MAX_TEXT_BYTES)
+    data = read_bytes(path, MAX_YAML_BYTES)
     try:
-        content = yaml.load(text, Loader=_LOADER)
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError, RecursionError) as error:
+        _check_depth(data, path)
+        content = yaml.load(data, Loader=_LOADER)
+    except HoocError:
+        raise
+    # Besides YAMLError, PyYAML lets whatever a strange scalar causes through.
+    except Exception as error:
         mark = getattr(error, 'problem_mark', None)
         where = f' at line {mark.line + 1}' if mark else ''
         raise HoocError(f'{path}: not valid YAML{where}; correct the syntax there') from None
@@ -60,18 +67,16 @@ def read_yaml(path):
 
 def read_json(path):
     """Return the mapping that a JSON file holds."""
-    text = read_bytes(path, MAX_TEXT_BYTES)
+    data = read_bytes(path, MAX_JSON_BYTES)
     try:
-        content = json.loads(text)
-    except json.JSONDecodeError as error:
-        raise HoocError(f'{path}: not valid JSON at line {error.lineno}; '
-                        'correct the syntax there') from None
-    except (UnicodeDecodeError, RecursionError):
-        raise HoocError(f'{path}: not valid JSON; write it as UTF-8 text again') from None
+        content = json.loads(data)
+    except (ValueError, RecursionError) as error:
+        where = f' at line {error.lineno}' if isinstance(error, json.JSONDecodeError) else ''
+        raise HoocError(f'{path}: not valid JSON{where}; correct the syntax there') from None
     return mapping(content, f'{path}:')
 
 
-def write_atomically(path, text):
+def write_atomically(path, content):
     """Write a text file so that a reader sees the old content or the new, never a part."""
     path = Path(path)
     try:
@@ -79,7 +84,7 @@ def write_atomically(path, text):
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
         try:
             with os.fdopen(handle, 'w', encoding='utf-8') as file:
-                file.write(text)
+                file.write(content)
             os.chmod(temporary, 0o644)
             os.replace(temporary, path)
         except BaseException:
@@ -93,14 +98,14 @@ def write_atomically(path, text):
 def mapping(value, where):
     """Return `value` if it is a mapping; `where` names file and field in the error."""
     if not isinstance(value, dict):
-        raise HoocError(f'{where} must hold "key: value" entries, not {_kind(value)}')
+        raise HoocError(f'{where} holds {_kind(value)}; give "key: value" entries')
     return value
 
 
 def sequence(value, where):
     """Return `value` if it is a list."""
     if not isinstance(value, list):
-        raise HoocError(f'{where} must be a list, not {_kind(value)}')
+        raise HoocError(f'{where} holds {_kind(value)}; give a list')
     return value
 
 
@@ -126,7 +131,7 @@ def number(value, where):
             raise ValueError
         result = float(value)
     except (TypeError, ValueError, OverflowError):
-        raise HoocError(f'{where} contains {value!r:.60}; give a number') from None
+        raise HoocError(f'{where} contains {shown(value)}; give a number') from None
     if not math.isfinite(result):
         raise HoocError(f'{where} contains {value}; give a finite number')
     return result
@@ -135,14 +140,21 @@ def number(value, where):
 def whole(value, low, high, where):
     """Return an int in low..high."""
     if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-        raise HoocError(f'{where} is {value!r:.60}; give a whole number from {low} to {high}')
+        raise HoocError(f'{where} is {shown(value)}; give a whole number from {low} to {high}')
+    return value
+
+
+def text(value, where):
+    """Return `value` if it is text."""
+    if not isinstance(value, str):
+        raise HoocError(f'{where} is {shown(value)}; give text, in quotes if it is a number')
     return value
 
 
 def name(value, where):
     """Return text that may serve as a file name: letters, digits, _ - and ."""
     if not isinstance(value, str) or not _NAME.match(value) or len(value) > 100:
-        raise HoocError(f'{where} is {value!r:.60}; use letters, digits, _, - and . '
+        raise HoocError(f'{where} is {shown(value)}; use letters, digits, _, - and . '
                         '(in quotes if it is a number)')
     return value
 
@@ -150,7 +162,7 @@ def name(value, where):
 def ros_token(value, where):
     """Return text that may stand in a topic's name."""
     if not isinstance(value, str) or not _ROS_TOKEN.match(value) or len(value) > 100:
-        raise HoocError(f'{where} is {value!r:.60}; topics are named after it, so begin with '
+        raise HoocError(f'{where} is {shown(value)}; topics are named after it, so begin with '
                         'a letter and use letters, digits and _')
     return value
 
@@ -168,10 +180,10 @@ def unique(names, where):
 def inside(root, relative, where):
     """Return root / relative, an existing file that lies inside `root`, links resolved."""
     if not isinstance(relative, str) or not relative or '\0' in relative:
-        raise HoocError(f'{where} is {relative!r:.60}; give a file name relative to {root}')
+        raise HoocError(f'{where} is {shown(relative)}; give a file name relative to {root}')
     path = Path(root) / relative
     if not path.resolve().is_relative_to(Path(root).resolve()):
-        raise HoocError(f'{where} is {relative!r:.200}, which leaves {root}; '
+        raise HoocError(f'{where} is {shown(relative)}, which leaves {root}; '
                         'move the file inside and name it relative to that folder')
     if not path.is_file():
         raise HoocError(f'{where} names {path}, which does not exist; '
@@ -247,7 +259,23 @@ def _complete(data):
     return False
 
 
+def _check_depth(data, path):
+    """Refuse deeply nested YAML: libyaml's composer would overflow the stack and crash."""
+    depth = 0
+    for event in yaml.parse(data, Loader=_LOADER):
+        depth += isinstance(event, yaml.CollectionStartEvent)
+        depth -= isinstance(event, yaml.CollectionEndEvent)
+        if depth > MAX_YAML_DEPTH:
+            raise HoocError(f'{path}: nested more than {MAX_YAML_DEPTH} levels deep at line '
+                            f'{event.start_mark.line + 1}; check that this is the right file')
+
+
+def shown(value):
+    """Return a short text of a value that a stranger wrote, however large it is."""
+    return reprlib.repr(value)[:60]
+
+
 def _kind(value):
     """Return what a parsed value is, in a user's words."""
     return {dict: 'entries', list: 'a list', str: 'text', type(None): 'nothing'}.get(
-        type(value), f'{value!r:.40}')
+        type(value), shown(value))

@@ -68,19 +68,16 @@ def load_results(path):
 def _check(content, path):
     """Raise HoocError where a results file breaks the format."""
     if files.required(content, 'format', f'{path}:') != FORMAT:
-        raise HoocError(f'{path}: format is {content["format"]!r:.60}; this version reads '
+        raise HoocError(f'{path}: format is {files.shown(content["format"])}; this version reads '
                         f'{FORMAT!r}, so write the results again')
-    if not isinstance(files.required(content, 'dataset', f'{path}:'), str):
-        raise HoocError(f'{path}: dataset is {content["dataset"]!r:.60}; give its name as text')
+    files.text(files.required(content, 'dataset', f'{path}:'), f'{path}: dataset')
     scenes = files.sequence(files.required(content, 'scenes', f'{path}:'), f'{path}: scenes')
     names = []
     for i, scene in enumerate(scenes):
         scene = files.mapping(scene, f'{path}: scenes[{i}]')
-        name = files.required(scene, 'scene', f'{path}: scenes[{i}]:')
-        if not isinstance(name, str):
-            raise HoocError(f'{path}: scenes[{i}] scene is {name!r:.60}; give its name as text')
-        names.append(name)
-        _check_scene(scene, f'{path}: scene {name}:')
+        names.append(files.text(files.required(scene, 'scene', f'{path}: scenes[{i}]:'),
+                                f'{path}: scenes[{i}] scene'))
+        _check_scene(scene, f'{path}: scene {names[-1]}:')
     files.unique(names, f'{path}: scenes')
 
 
@@ -98,8 +95,7 @@ def _check_scene(scene, where):
     for i, item in enumerate(objects):
         at = f'{where} objects[{i}]'
         item = files.mapping(item, at)
-        if not isinstance(files.required(item, 'category', at), str):
-            raise HoocError(f'{at} category is {item["category"]!r:.60}; give its name as text')
+        files.text(files.required(item, 'category', at), f'{at} category')
         if item.get('score') is not None:
             files.number(item['score'], f'{at} score')
         files.numbers(files.required(item, 'translation', at), 3, f'{at} translation')

@@ -85,7 +85,7 @@ def _load_hooc(path, with_scenes):
     file = path / 'dataset.yaml'
     entry = files.read_yaml(file)
     if files.required(entry, 'format', f'{file}:') != FORMAT:
-        raise HoocError(f'{file}: format is {entry["format"]!r:.60}; this version reads '
+        raise HoocError(f'{file}: format is {files.shown(entry["format"])}; this version reads '
                         f'{FORMAT!r}, so convert the set or correct the field')
     categories = _categories(path, file, entry)
     camera_names = files.unique(
@@ -201,8 +201,8 @@ def _true_object(item, where, known):
     item = files.mapping(item, where)
     category = files.required(item, 'category', f'{where}:')
     if not isinstance(category, str) or category not in known:
-        raise HoocError(f'{where} category is {category!r:.60}, which dataset.yaml does not '
-                        'list; add it there or correct the name')
+        raise HoocError(f'{where} category is {files.shown(category)}, which is not in '
+                        'dataset.yaml; add it there or correct the name')
     where = f'{where} ({category})'
     translation, rotation = camera_files.pose(item, where)
     if abs(translation).max() > MAX_METRES:

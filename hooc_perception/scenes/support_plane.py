@@ -21,6 +21,8 @@ TOLERANCE_M, TOLERANCE_PER_M = 0.006, 0.004
 # What stands on a table: between these heights.
 LOWEST_M, HIGHEST_M = 0.015, 0.5
 MIN_STANDING_SHARE = 0.003
+# Cosine between a plane's normal and the images' upward direction; 0 seen from straight above.
+MIN_UPRIGHT = 0.1
 CELL_M = 0.02
 
 
@@ -54,14 +56,16 @@ def estimate_table_frame(views, scene_name):
     """
     Return the SupportPlane of one scene: RANSAC, then a least-squares fit to the inliers.
 
-    The table is the largest plane that faces the first camera and on which something stands.
-    The same views give the same frame.
+    The table is the largest plane on which something stands and whose normal points upwards in
+    the images, as a table's does for a camera that hangs upright; a wall's does not. Where no
+    plane has both, one will do. The same views give the same frame.
 
     :param views: DepthViews, raw; their cameras' poses say where the source frame is.
     :raises HoocError: where no plane holds a fair share of the points.
     """
     points, tolerance = _points(views)
     T_source_camera = views[0].camera.T_world_camera
+    image_up = -np.mean([view.camera.T_world_camera[:3, 1] for view in views], axis=0)
     rng = stage_rng(0, 'table')
     left = np.ones(len(points), bool)
     best = None
@@ -75,15 +79,16 @@ def estimate_table_frame(views, scene_name):
         if normal @ T_source_camera[:3, 3] + offset < 0:
             normal, offset = -normal, -offset
         standing = _standing(points, normal, offset, inliers)
-        plane = (standing.sum() >= MIN_STANDING_SHARE * len(points), int(inliers.sum()))
+        stands = standing.sum() >= MIN_STANDING_SHARE * len(points)
+        plane = (int(stands) + int(normal @ image_up > MIN_UPRIGHT), int(inliers.sum()))
         if best is None or plane > best[0]:
             best = plane, normal, offset, inliers, standing
     if best is None:
         raise HoocError(f'scene {scene_name}: no support plane is found in the depth images, so '
                         'the table frame stays unknown; give extrinsics in a table frame')
     _, normal, offset, inliers, standing = best
-    centre = _centre(points[standing if standing.any() else inliers])
-    T_table_source = _frame(normal, offset, centre, T_source_camera)
+    T_table_source = _frame(normal, offset, points[standing if standing.any() else inliers],
+                            T_source_camera)
     height = transform(T_table_source, points[inliers])[:, 2]
     return SupportPlane(T_table_source, float(inliers.mean()),
                         float(np.sqrt(np.mean(height ** 2))))
@@ -166,22 +171,18 @@ def _standing(points, normal, offset, inliers):
     return standing
 
 
-def _centre(points):
-    """Return the mean of the occupied cells: not drawn to what is near a camera."""
-    return np.unique(np.floor(points / CELL_M), axis=0).mean(0) * CELL_M + CELL_M / 2
-
-
-def _frame(normal, offset, centre, T_source_camera):
-    """Return T_table_source of a plane, an origin above or on it, and the first camera."""
+def _frame(normal, offset, points, T_source_camera):
+    """Return T_table_source with the origin under the middle of the points' footprint."""
     z = normal
     right = T_source_camera[:3, 0]
     x = right - z * (right @ z)
     if np.linalg.norm(x) < 0.1:
         x = np.cross(T_source_camera[:3, 1], z)
     x /= np.linalg.norm(x)
-    R_table_source = np.stack([x, np.cross(z, x), z])
-    origin = centre - normal * (normal @ centre + offset)
     T_table_source = np.eye(4)
-    T_table_source[:3, :3] = R_table_source
-    T_table_source[:3, 3] = -R_table_source @ origin
+    T_table_source[:3, :3] = np.stack([x, np.cross(z, x), z])
+    T_table_source[2, 3] = offset
+    flat = transform(T_table_source, points)[:, :2]
+    # Cells count once, so that neither tall things nor those near a camera draw the middle.
+    T_table_source[:2, 3] = -CELL_M * (np.unique(np.floor(flat / CELL_M), axis=0) + 0.5).mean(0)
     return T_table_source

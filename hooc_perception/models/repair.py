@@ -17,6 +17,7 @@ The parts are then united, so that parts that overlap are counted once.
 """
 
 import manifold3d
+import numba as nb
 import numpy as np
 from scipy.spatial import cKDTree
 import trimesh
@@ -139,7 +140,11 @@ def _capped(part, loops):
 
 def _thickened(part, loops):
     """Return a sheet as a shell of thickness SHEET_M, half to each side, with closed rims."""
-    offset = part.vertex_normals * SHEET_M / 2
+    # At a crease the middle line is longer than the thickness of the faces that meet there.
+    lean = np.einsum('fkj,fj->fk', part.vertex_normals[part.faces], part.face_normals)
+    count = np.bincount(part.faces.ravel(), minlength=len(part.vertices))
+    lean = np.bincount(part.faces.ravel(), lean.ravel(), len(part.vertices)) / np.maximum(count, 1)
+    offset = part.vertex_normals * (SHEET_M / 2 / np.maximum(lean, 0.4))[:, None]
     n = len(part.vertices)
     faces = [part.faces, part.faces[:, ::-1] + n]
     for loop in loops:
@@ -188,25 +193,53 @@ def _level_set(mesh):
     lower, upper = mesh.bounds[0] - 2 * step, mesh.bounds[1] + 2 * step
     axes = [np.arange(a, b + step, step) for a, b in zip(lower, upper)]
     grid = np.stack(np.meshgrid(*axes, indexing='ij'), -1).reshape(-1, 3)
-    winding = _winding(grid, samples, normals, mesh.area / len(samples))
     distance = dense.query(grid)[0]
     reach = max(SHEET_M / 2, 0.6 * step)
-    inside = np.abs(winding) > 0.5
+    inside = np.abs(_winding(grid, np.ascontiguousarray(samples), np.ascontiguousarray(normals),
+                             mesh.area / len(samples))) > 0.5
     field = np.where(inside, distance, reach - distance).reshape([len(a) for a in axes])
 
-    from scipy.interpolate import RegularGridInterpolator
-    look_up = RegularGridInterpolator(axes, field, bounds_error=False, fill_value=-step)
-    solid = manifold3d.Manifold.level_set(
-        lambda x, y, z: float(look_up((x, y, z))), [*lower, *upper], step)
-    return from_manifold(solid)
+    solid = manifold3d.Manifold.level_set(_trilinear(field, lower, step),
+                                          [*lower, *(lower + (np.array(field.shape) - 1) * step)],
+                                          step)
+    return from_manifold(solid.simplify(step / 4))
 
 
+def _trilinear(field, lower, step):
+    """Return f(x, y, z) of values on a grid; plain Python, as it is called point by point."""
+    x0, y0, z0 = lower.tolist()
+    nx, ny, nz = field.shape
+    along_x, along_y = ny * nz, nz
+    values = field.ravel().tolist()
+
+    def at(x, y, z):
+        x, y, z = (x - x0) / step, (y - y0) / step, (z - z0) / step
+        if not (0 <= x < nx - 1 and 0 <= y < ny - 1 and 0 <= z < nz - 1):
+            return -step
+        i, j, k = int(x), int(y), int(z)
+        x, y, z = x - i, y - j, z - k
+        n = i * along_x + j * along_y + k
+        low = ((values[n] * (1 - z) + values[n + 1] * z) * (1 - y)
+               + (values[n + along_y] * (1 - z) + values[n + along_y + 1] * z) * y)
+        n += along_x
+        high = ((values[n] * (1 - z) + values[n + 1] * z) * (1 - y)
+                + (values[n + along_y] * (1 - z) + values[n + along_y + 1] * z) * y)
+        return low * (1 - x) + high * x
+    return at
+
+
+@nb.njit(cache=True)
 def _winding(points, samples, normals, area):
     """Return the generalized winding number (n,) of points, the surface taken as dipoles."""
     out = np.zeros(len(points))
-    for start in range(0, len(points), 4096):
-        d = samples[None] - points[start:start + 4096, None]
-        r = np.linalg.norm(d, axis=2)
-        out[start:start + 4096] = (np.einsum('ijk,jk->ij', d, normals)
-                                   / np.maximum(r, 1e-9) ** 3).sum(1)
-    return out * area / (4 * np.pi)
+    for i in range(len(points)):
+        total = 0.0
+        for j in range(len(samples)):
+            x = samples[j, 0] - points[i, 0]
+            y = samples[j, 1] - points[i, 1]
+            z = samples[j, 2] - points[i, 2]
+            r2 = max(x * x + y * y + z * z, 1e-12)
+            total += (x * normals[j, 0] + y * normals[j, 1] + z * normals[j, 2]) / (
+                r2 * np.sqrt(r2))
+        out[i] = total * area / (4.0 * np.pi)
+    return out

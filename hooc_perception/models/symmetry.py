@@ -9,7 +9,7 @@ import trimesh
 
 # A turned surface is the same when 98 % of it comes to lie within this share of its greatest
 # distance from the axis: low enough to see a teacup's handle or the two widths of a box, high
-# enough for the facets of a 16-sided cylinder (2 %) and a little modelling noise. For thin
+# enough for the facets of a hexagonal pencil to count as round. For thin
 # things the share of the thinnest side counts: a knife's blade is not like its handle.
 TOLERANCE = 0.07
 TOLERANCE_THIN = 0.12

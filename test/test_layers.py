@@ -31,6 +31,8 @@ ALLOWED = {
     'ros': {'numpy', 'rclpy', 'hooc_perception.core'},
     'nodes': {'numpy', 'rclpy', 'hooc_perception.core', 'hooc_perception.ros',
               'hooc_perception.models.folder'},
+    'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.scenes',
+                  'hooc_perception.replay'},
     'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',
                    'hooc_perception.ros', 'hooc_perception.nodes', 'hooc_perception.models.folder',
                    'hooc_perception.scenes', 'hooc_perception.replay'},

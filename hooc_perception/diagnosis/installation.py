@@ -1,0 +1,241 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Check that everything the package uses is there and works, by using it."""
+
+import ctypes
+import importlib
+import importlib.metadata
+import os
+from pathlib import Path
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING
+
+PYTHONS = ((3, 11), (3, 12))
+# Module -> (distribution, what does not work without it).
+PACKAGES = {
+    'numpy': ('numpy', 'anything'), 'scipy': ('scipy', 'anything'), 'numba': ('numba', 'anything'),
+    'yaml': ('PyYAML', 'scene sets'), 'cv2': ('opencv-python-headless', 'scene sets'),
+    'trimesh': ('trimesh', 'meshes'), 'manifold3d': ('manifold3d', 'the repair of meshes'),
+    'fcl': ('python-fcl', 'training'), 'mujoco': ('mujoco', 'training of the best profile'),
+    'sklearn': ('scikit-learn', 'evaluation'), 'rosbags': ('rosbags', 'bags'),
+    'open3d': ('open3d', 'baselines of the evaluation'),
+    'pyrender': ('pyrender', 'shaded pictures in reports'),
+    'matplotlib': ('matplotlib', 'plots'), 'jinja2': ('Jinja2', 'reports'),
+    'PIL': ('pillow', 'pictures'), 'tqdm': ('tqdm', 'progress bars'),
+    'psutil': ('psutil', 'benchmarks'), 'rclpy': ('ros-jazzy-rclpy', 'the nodes'),
+}
+# Shared library -> the Debian and Ubuntu package that holds it.
+LIBRARIES = {'libusb-1.0.so.0': 'libusb-1.0-0', 'libGL.so.1': 'libgl1', 'libEGL.so.1': 'libegl1',
+             'libgomp.so.1': 'libgomp1'}
+SETUP = 'run "make setup" in the source tree'
+LOW_DISK_GB, LOW_MEMORY_GB = 1.0, 4.0
+
+GL_PROBE = """
+import numpy
+numpy.infty = numpy.inf
+import pyrender, trimesh
+scene = pyrender.Scene()
+scene.add(pyrender.Mesh.from_trimesh(trimesh.creation.box()))
+pose = trimesh.transformations.translation_matrix([0, 0, 3])
+scene.add(pyrender.PerspectiveCamera(1.0), pose=pose)
+depth = pyrender.OffscreenRenderer(32, 32).render(scene)[1]
+assert abs(depth[16, 16] - 2.5) < 0.02, 'wrong picture'
+"""
+
+ROS_PROBE = """
+import os, sys, time
+import rclpy
+from rclpy.qos import QoSProfile
+from std_msgs.msg import String
+rclpy.init(args=['--ros-args', '--log-level', 'fatal'])
+node = rclpy.create_node('hooc_doctor')
+heard = []
+node.create_subscription(String, 'hooc_doctor_probe', heard.append, QoSProfile(depth=1))
+publisher = node.create_publisher(String, 'hooc_doctor_probe', QoSProfile(depth=1))
+end = time.monotonic() + 10
+while not heard and time.monotonic() < end:
+    publisher.publish(String(data='x'))
+    rclpy.spin_once(node, timeout_sec=0.1)
+print(rclpy.get_rmw_implementation_identifier(), os.path.dirname(rclpy.__file__))
+node.destroy_node()
+rclpy.try_shutdown()
+sys.exit(not heard)
+"""
+
+
+def check_installation():
+    """Yield a Finding for each check of this installation, cheap ones first."""
+    yield check_python()
+    yield from check_libraries()
+    yield from check_packages()
+    yield check_kernels()
+    yield check_gl()
+    yield check_ros()
+    yield check_shared_memory()
+    yield from check_resources()
+
+
+def check_python(version=None):
+    """Return the Finding on the interpreter; `version` is (major, minor), None = this one's."""
+    version = version or sys.version_info[:2]
+    text = f'{platform.python_version()} in {sys.prefix}'
+    if tuple(version) in PYTHONS:
+        return Finding(OK, 'Python', text)
+    return Finding(ERROR, 'Python', f'{version[0]}.{version[1]} is not served; '
+                   'install Python 3.12 or 3.11, remove .venv and ' + SETUP)
+
+
+def check_libraries(libraries=None):
+    """Yield a Finding for each system library (dict file name -> Debian package)."""
+    for name, package in (LIBRARIES if libraries is None else libraries).items():
+        try:
+            ctypes.CDLL(name)
+            yield Finding(OK, name, 'found')
+        except OSError:
+            yield Finding(ERROR, name,
+                          f'not found; run "apt-get install {package}" as root')
+
+
+def check_packages(packages=None):
+    """Yield a Finding for each Python package, by importing it."""
+    pins = pinned()
+    for module, (name, need) in (PACKAGES if packages is None else packages).items():
+        try:
+            importlib.import_module(module)
+        except Exception as error:      # a broken library may raise anything when imported
+            yield Finding(ERROR, name, f'does not import ({_one_line(error)}), so {need} will '
+                          f'fail; {_mend(error)}')
+            continue
+        version = _version(name)
+        pin = pins.get(name.lower())
+        if pin and version and pin != version:
+            yield Finding(WARNING, name, f'{version} is installed, but {pin} is what the tests '
+                          f'ran with; {SETUP}')
+        else:
+            yield Finding(OK, name, version or 'found')
+
+
+def pinned():
+    """Return {lower-case name: version} of requirements.txt, {} outside of a source tree."""
+    path = Path(__file__).resolve().parents[2] / 'requirements.txt'
+    if not path.is_file():
+        return {}
+    return dict(line.split(';')[0].strip().split('==') for line in path.read_text().splitlines()
+                if '==' in line and not line.startswith('#'))
+
+
+def check_kernels():
+    """Return the Finding on compiled code: that a kernel runs, and where its cache is."""
+    try:
+        from hooc_perception.core.kernels import raster
+        import numpy as np
+        raster.project_vertices(np.ones((1, 3)), np.eye(3), np.zeros(3), 1.0, 1.0, 0.0, 0.0)
+        cache = raster.project_vertices.stats.cache_path
+    except Exception as error:
+        return Finding(ERROR, 'compiled code', f'a kernel does not run ({_one_line(error)}); '
+                       'set NUMBA_CACHE_DIR to a folder that you can write to')
+    return Finding(OK, 'compiled code', f'kept in {cache}')
+
+
+def check_gl():
+    """Return the Finding on off-screen rendering: EGL, else OSMesa, else none."""
+    errors = {}
+    for name in ('egl', 'osmesa'):
+        run = _probe(GL_PROBE, {'PYOPENGL_PLATFORM': name})
+        if run.returncode == 0:
+            return Finding(OK, 'rendering', f'pyrender draws with {name.upper()}')
+        errors[name] = _last_line(run.stderr)
+    return Finding(WARNING, 'rendering', f'pyrender draws neither with EGL ({errors["egl"]}) nor '
+                   'with OSMesa, so reports get plainer pictures; run "apt-get install libegl1 '
+                   'libgl1-mesa-dri" or "apt-get install libosmesa6" as root')
+
+
+def check_ros():
+    """Return the Finding on ROS: a message must come back through the middleware."""
+    run = _probe(ROS_PROBE, {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'})
+    if run.returncode == 0:
+        rmw, place = run.stdout.split(None, 1)
+        text = f'a message came back through {rmw}; rclpy is in {place.strip()}'
+        distro = os.environ.get('ROS_DISTRO')
+        if distro and distro != 'jazzy':
+            return Finding(WARNING, 'ROS', f'works, but ROS {distro} is sourced and these nodes '
+                           'speak Jazzy; open a shell without it')
+        return Finding(OK, 'ROS', text)
+    if os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') != 'rmw_fastrtps_cpp':
+        return Finding(ERROR, 'ROS', f'the middleware {os.environ["RMW_IMPLEMENTATION"]} is not '
+                       'installed here; unset RMW_IMPLEMENTATION')
+    return Finding(ERROR, 'ROS', 'no message comes back through the middleware '
+                   f'({_last_line(run.stderr) or "silence"}); check that the loopback network is '
+                   'up and that no firewall stops UDP on it')
+
+
+def check_shared_memory(folder='/dev/shm', need_mb=640):
+    """
+    Return the Finding on shared memory, through which images travel fastest.
+
+    :param need_mb: what the supervisor's transport profile wants: 8 processes x 64 MB x 1.25.
+    """
+    if not os.path.isdir(folder):
+        return Finding(WARNING, 'shared memory', f'{folder} is missing, so images take the slower '
+                       'way; mount a tmpfs there')
+    free = shutil.disk_usage(folder).free / 2 ** 20
+    if free < need_mb:
+        return Finding(WARNING, 'shared memory', f'{folder} has {free:.0f} MB free of the '
+                       f'{need_mb} MB that fast transport wants, so images take the slower way; '
+                       'remove stale files there, or start the container with --shm-size=1g')
+    return Finding(OK, 'shared memory', f'{free / 1024:.1f} GB free')
+
+
+def check_resources():
+    """Yield the Findings on disk and memory."""
+    for place in dict.fromkeys((os.getcwd(), tempfile.gettempdir())):
+        free = shutil.disk_usage(place).free / 2 ** 30
+        low = free < LOW_DISK_GB
+        yield Finding(WARNING if low else OK, 'disk', f'{free:.1f} GB free in {place}'
+                      + ('; free some space before you train or record' if low else ''))
+    memory = os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2 ** 30
+    low = memory < LOW_MEMORY_GB
+    yield Finding(WARNING if low else OK, 'memory', f'{memory:.1f} GB, {os.cpu_count()} cores'
+                  + ('; training may need 4 GB' if low else ''))
+
+
+def _probe(code, variables):
+    """Run Python code in a process of its own, so that a crash there is only a finding."""
+    try:
+        return subprocess.run([sys.executable, '-c', code], env={**os.environ, **variables},
+                              capture_output=True, text=True, timeout=60)
+    except subprocess.TimeoutExpired as error:
+        return subprocess.CompletedProcess(error.cmd, 124, '', 'no answer within 60 s')
+
+
+def _mend(error):
+    """Return what to do about a failed import."""
+    found = re.search(r'(lib[\w.+-]+\.so[.\d]*)', str(error))
+    if found and found[1] in LIBRARIES:
+        return f'run "apt-get install {LIBRARIES[found[1]]}" as root'
+    return SETUP
+
+
+def _version(name):
+    """Return the installed version of a distribution, None where it has no metadata."""
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None
+
+
+def _one_line(error):
+    """Return an exception as one short line."""
+    return (' '.join(str(error).split()) or type(error).__name__)[:160]
+
+
+def _last_line(text):
+    """Return the last line of an error output, shortened."""
+    lines = text.strip().splitlines()
+    return lines[-1].strip()[:160] if lines else ''

@@ -1,0 +1,248 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bags with one fault each: the doctor must name it, and must be silent about a sound bag."""
+
+from types import SimpleNamespace
+
+from hooc_perception.cli.main import main
+from hooc_perception.core.geometry import rays
+from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import Camera, DepthView
+from hooc_perception.diagnosis.bag import check_bag
+from hooc_perception.diagnosis.finding import ERROR, OK, WARNING, worst
+from hooc_perception.replay.bag_files import iter_messages, topics
+from hooc_perception.replay.bag_writer import STORAGES, TYPES, write_bag
+import numpy as np
+import pytest
+from rosbags.interfaces import QosDurability
+from rosbags.rosbag2 import Writer
+import trimesh
+
+
+def camera_above(name, azimuth):
+    """Return a Camera one metre away that looks down at the origin from `azimuth` (rad)."""
+    eye = np.array([0.8 * np.cos(azimuth), 0.8 * np.sin(azimuth), 0.8])
+    forward = -eye / np.linalg.norm(eye)
+    right = np.cross(forward, [0, 0, 1.0])
+    right /= np.linalg.norm(right)
+    T_world_camera = np.eye(4)
+    T_world_camera[:3] = np.column_stack([right, np.cross(forward, right), forward, eye])
+    K = np.array([[180, 0, 79.5], [0, 180, 59.5], [0, 0, 1.0]])
+    return Camera(name, 160, 120, K, np.zeros(5), T_world_camera)
+
+
+def depth_of(camera):
+    """Return the (H, W) depth of a table with a box on it."""
+    box = trimesh.creation.box((0.2, 0.15, 0.2))
+    depth = render_depth([(box.vertices + [0, 0, 0.1], box.faces.astype(np.int32))], camera)[0]
+    T = camera.T_world_camera
+    table = -T[2, 3] / (rays(camera.K, camera.height, camera.width) @ T[2, :3])
+    return np.where(table > 0, np.minimum(depth, table), np.nan).astype(np.float32)
+
+
+@pytest.fixture(scope='module')
+def sound(tmp_path_factory):
+    """Return the path of a bag that nothing is wrong with: three cameras, three frame sets."""
+    cameras = tuple(camera_above(f'camera{i}', i * 2.1) for i in range(3))
+    scene = SimpleNamespace(
+        name='sound', cameras=cameras, truth=None, world={}, depth_units=(0.001,) * 3,
+        labels=lambda: None, depth=lambda: tuple(DepthView(c, depth_of(c)) for c in cameras))
+    scene_set = SimpleNamespace(name='test', world_frame='table', category_names=('box',),
+                                max_instances=1)
+    return write_bag(scene, scene_set, tmp_path_factory.mktemp('bags'), repeat=3)
+
+
+def rewritten(source, target, edit=lambda topic, message, i: message, latched=True):
+    """
+    Copy a bag message by message through `edit(topic, message, i) -> message or None`.
+
+    :param i: how many messages of that topic came before.
+    :param latched: False writes all topics volatile.
+    """
+    known = topics(source)
+    with Writer(target, version=9, storage_plugin=STORAGES['mcap']) as writer:
+        profiles = offered(source)
+        if not latched:
+            profiles = {name: [p._replace(durability=QosDurability.VOLATILE) for p in rows]
+                        for name, rows in profiles.items()}
+        connections, counts = {}, dict.fromkeys(known, 0)
+        for entry in iter_messages(source):
+            name, kind = entry.topic.name, entry.topic.type_name
+            message = edit(name, entry.read(source), counts[name])
+            counts[name] += 1
+            if message is None:
+                continue
+            if name not in connections:
+                connections[name] = writer.add_connection(
+                    name, kind, typestore=TYPES, offered_qos_profiles=profiles[name])
+            writer.write(connections[name], entry.time_ns, TYPES.serialize_cdr(message, kind))
+    return target
+
+
+def offered(source):
+    """Return {topic: its QoS profiles}."""
+    from rosbags.rosbag2 import Reader
+    with Reader(source) as reader:
+        return {c.topic: list(c.ext.offered_qos_profiles) for c in reader.connections}
+
+
+def found(path, level):
+    """Return the sentences of one level, joined."""
+    return '\n'.join(f'{f.subject}: {f.text}' for f in check_bag(path) if f.level == level)
+
+
+def test_a_sound_bag_is_called_sound(sound):
+    findings = list(check_bag(sound))
+    assert worst(findings) == OK, findings
+    assert {'camera0', 'camera1', 'camera2', 'frame sets', 'table'} <= {
+        f.subject for f in findings}
+
+
+def drop(name):
+    """Return an edit that leaves a topic out."""
+    return lambda topic, message, i: None if topic == name else message
+
+
+def image_edit(change, camera='camera1'):
+    """Return an edit that applies `change(image, i)` to one camera's depth images."""
+    def edit(topic, message, i):
+        if topic == f'/hooc/{camera}/depth/image_raw':
+            change(message, i)
+        return message
+    return edit
+
+
+def unstamped(image, i):
+    """Take the stamp away."""
+    image.header.stamp.sec = image.header.stamp.nanosec = 0
+
+
+def late(image, i):
+    """Shift the clock of the camera by five seconds."""
+    image.header.stamp.sec += 5
+
+
+def backwards(image, i):
+    """Let time run backwards."""
+    image.header.stamp.sec -= i
+
+
+def blind(image, i):
+    """Take every reading away."""
+    image.data = np.zeros_like(image.data)
+
+
+def nearly_blind(image, i):
+    """Leave a tenth of the rows."""
+    image.data = image.data.copy()
+    image.data[image.step * 12:] = 0
+
+
+def cut(image, i):
+    """Cut the second image's data off."""
+    if i == 1:
+        image.data = image.data[:1000]
+
+
+def colour(image, i):
+    """Claim a colour encoding."""
+    if i == 1:
+        image.encoding = 'rgb8'
+
+
+def metres_as_millimetres(image, i):
+    """Publish millimetres as floating point numbers."""
+    counts = image.data.view(np.uint16).astype(np.float32)
+    image.data, image.step, image.encoding = counts.view(np.uint8), image.step * 2, '32FC1'
+
+
+@pytest.mark.parametrize('edit, level, words', [
+    (drop('/hooc/camera1/depth/camera_info'), ERROR, ['camera1', 'camera_info is missing']),
+    (image_edit(unstamped), ERROR, ['camera1', 'no header stamps']),
+    (image_edit(late), ERROR, ['camera1', 'synchronise the clocks']),
+    (image_edit(backwards), WARNING, ['camera1', 'go back in time']),
+    (image_edit(blind), ERROR, ['camera1', 'no reading at all']),
+    (image_edit(nearly_blind), WARNING, ['camera1', 'of its pixels']),
+    (image_edit(cut), ERROR, ['camera1', '1 of 3 images', 'needs']),
+    (image_edit(colour), ERROR, ['camera1', "'rgb8'", '16UC1']),
+    (image_edit(metres_as_millimetres), ERROR, ['camera1', 'millimetres as 32FC1']),
+])
+def test_faults_of_one_camera(sound, tmp_path, edit, level, words):
+    text = found(rewritten(sound, tmp_path / 'bag', edit), level)
+    for word in words:
+        assert word in text, text
+
+
+def test_sizes_that_disagree(sound, tmp_path):
+    def edit(topic, message, i):
+        if topic == '/hooc/camera2/depth/camera_info':
+            message.width = 640
+        return message
+    text = found(rewritten(sound, tmp_path / 'bag', edit), ERROR)
+    assert 'width 640' in text and '160 x 120' in text
+
+
+def test_singular_calibration(sound, tmp_path):
+    def edit(topic, message, i):
+        if topic.endswith('camera0/depth/camera_info'):
+            message.k = np.zeros(9)
+        return message
+    assert 'camera0' in found(rewritten(sound, tmp_path / 'bag', edit), ERROR)
+
+
+def test_missing_extrinsics(sound, tmp_path):
+    def edit(topic, message, i):
+        if topic == '/tf_static':
+            message.transforms = message.transforms[:2]
+        return None if topic == '/hooc/camera2/extrinsics' else message
+    text = found(rewritten(sound, tmp_path / 'bag', edit), ERROR)
+    assert 'nothing connects camera camera2' in text
+
+
+def transforms(topic, message):
+    """Return the transforms of a message that holds any."""
+    return getattr(message, 'transforms', None) or (
+        [message] if topic.endswith('/extrinsics') else [])
+
+
+def test_inverted_extrinsics(sound, tmp_path):
+    def edit(topic, message, i):
+        for stamped in transforms(topic, message):
+            stamped.transform.translation.z *= -1
+        return message
+    assert 'below the table' in found(rewritten(sound, tmp_path / 'bag', edit), ERROR)
+
+
+def test_extrinsics_that_miss_the_table(sound, tmp_path):
+    def edit(topic, message, i):
+        for stamped in transforms(topic, message):
+            if stamped.child_frame_id.startswith('camera1'):
+                stamped.transform.translation.z += 0.015
+        return message
+    text = found(rewritten(sound, tmp_path / 'bag', edit), WARNING)
+    assert 'camera1: its pose is 15 mm' in text and 'camera0' not in text
+
+
+def test_transforms_that_are_not_latched(sound, tmp_path):
+    text = found(rewritten(sound, tmp_path / 'bag', latched=False), WARNING)
+    assert '/tf_static was recorded without transient-local' in text
+
+
+def test_no_depth_at_all(sound, tmp_path):
+    def edit(topic, message, i):
+        return None if topic.endswith('image_raw') else message
+    assert 'no depth topic' in found(rewritten(sound, tmp_path / 'bag', edit), ERROR)
+
+
+def test_truncated_file(sound, tmp_path):
+    folder = rewritten(sound, tmp_path / 'bag')
+    storage = next(folder.glob('*.mcap'))
+    storage.write_bytes(storage.read_bytes()[:-20000])
+    assert 'truncated' in found(folder, ERROR)
+
+
+def test_missing_bag_and_exit_codes(sound, tmp_path, capsys):
+    assert main(['doctor', str(sound)]) == 0
+    assert '0 errors' in capsys.readouterr().out
+    assert main(['doctor', str(tmp_path / 'nowhere')]) == 1
+    assert 'there is no such bag' in capsys.readouterr().out

@@ -78,19 +78,20 @@ class Compositor:
         self.pixels = used = np.flatnonzero(seen)
         cost_none = rounded(cost_none)
         self._unseen = float(cost_none[~seen].sum())
-        self._offsets = offsets
-        self._pixel = (np.cumsum(seen) - 1)[pixel].astype(np.int32)
         self._unary = rounded(unary)
-        self._owner, self._cost, self._slot, self._start, self._entry = kernels.build(
-            offsets, self._pixel, np.ascontiguousarray(depth, np.float32),
-            rounded(cost).astype(np.float32), cost_none[used].astype(np.float32))
+        owner, slot_cost, self._run, self._entry = kernels.build(
+            offsets, (np.cumsum(seen) - 1)[pixel].astype(np.int32),
+            np.ascontiguousarray(depth, np.float32), rounded(cost).astype(np.float32),
+            cost_none[used].astype(np.float32))
+        (self._kind, self._offsets, self._pixel, self._slot, self._owner, self._cost,
+         self._start) = _merged(self._run, owner, slot_cost, n)
         self._group = (np.zeros(n, np.int64) if group is None
                        else np.unique(group, return_inverse=True)[1])
         self._max_per_group = int(max_per_group)
         self._active = np.zeros(n + 1, bool)
         self._active[n] = True
-        self._first, self._second = np.zeros((2, len(used)), np.int32)
-        self._nearest = np.zeros(len(used), np.int32)
+        self._first, self._second = np.zeros((2, len(self._start) - 1), np.int32)
+        self._nearest = np.zeros(len(self._start) - 1, np.int32)
         self._deltas = np.zeros(n + 1)
         self.reset(np.zeros(n, bool))
 
@@ -148,9 +149,26 @@ class Compositor:
         """
         kernels.evaluate(np.flatnonzero(mask), self._offsets, self._pixel, self._slot,
                          self._start, self._cost, self._nearest)
-        return self._entry[self._nearest].astype(np.int64)
+        place = self._nearest - self._start[:-1]
+        return self._entry[self._run[:-1] + place[self._kind]].astype(np.int64)
 
     def shown(self):
         """Return (len(self.pixels),) int32: the candidate shown at each of `pixels`, or -1."""
-        owner = self._owner[self._first]
+        owner = self._owner[self._first][self._kind]
         return np.where(owner == self.n, -1, owner).astype(np.int32)
+
+
+def _merged(start, owner, cost, n):
+    """Return (kind of each pixel, *arrays of kernels.merge) for runs of slots."""
+    _, example, kind = np.unique(kernels.fingerprints(start, owner), return_index=True,
+                                 return_inverse=True)
+    # Number the kinds as they come in the images: neighbours stay neighbours in memory.
+    order = np.argsort(example)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    kind, example = rank[kind], example[order]
+    same, *merged = kernels.merge(start, owner, cost, n, kind, example)
+    if not same:  # two fingerprints in 2^64 collided: do without merging
+        kind = np.arange(len(kind))
+        same, *merged = kernels.merge(start, owner, cost, n, kind, kind)
+    return kind, *merged

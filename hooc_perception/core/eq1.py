@@ -135,7 +135,7 @@ class Eq1:
 
         return Energy(total(self._none_depth, self._depth) / self.n_pixels,
                       total(self._none_miss, self._miss) / self.n_pixels,
-                      self._overlap.evaluate(mask) / max(np.count_nonzero(mask), 1))
+                      float(self._overlap.evaluate(mask)) / max(np.count_nonzero(mask), 1))
 
 
 def _listed_row(observation, probabilities):

@@ -49,12 +49,20 @@ class OutOfTimeError(Exception):
 
 
 def greedy(energy, stop=None):
-    """Flip whatever lowers the energy most until nothing does; raise OutOfTimeError by `stop`."""
+    """
+    Flip whatever lowers the energy most until nothing does.
+
+    A member that costs nothing to leave out (nobody sees it) is left out.
+
+    :raises OutOfTimeError: where `stop` says so.
+    """
     while energy.n:
         deltas = energy.deltas()
         k = int(np.argmin(deltas))
         if deltas[k] >= -TINY:
-            return
+            k = int(np.argmin(np.where(energy.mask, deltas, np.inf)))
+            if not energy.mask[k] or deltas[k] > TINY:
+                return
         energy.flip(k)
         if stop is not None and stop():
             raise OutOfTimeError

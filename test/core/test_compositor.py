@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compositor against a plain numpy z-minimum."""
 
+from hooc_perception.core import compositor
 from hooc_perception.core.compositor import Compositor
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -103,3 +104,28 @@ def test_bad_lists_are_named(change, message):
              'cost_none': [0.0, 0.0], **change}
     with pytest.raises(HoocError, match=message):
         Compositor(**lists)
+
+
+def test_pixels_with_the_same_candidates_in_the_same_order_are_merged():
+    energy = Compositor([0, 3, 6], [0, 1, 2, 1, 2, 3], [1, 1, 1, .5, .5, .5], [1, 2, 4, 8, 16, 32],
+                        [64., 128, 256, 512, 1024])
+    assert len(energy._start) - 1 == 3
+    values = {mask: energy.evaluate(np.array(mask, bool)) for mask in (
+        (0, 0), (1, 0), (0, 1), (1, 1))}
+    assert values == {(0, 0): 1984, (1, 0): 1543, (0, 1): 1144, (1, 1): 1081}
+    assert np.array_equal(energy.entries_shown(np.array([True, True])), [0, 3, 4, 5])
+    assert np.array_equal(energy.entries_shown(np.array([True, False])), [0, 1, 2, -1])
+
+
+def test_colliding_fingerprints_change_nothing(monkeypatch):
+    lists = random_lists(np.random.default_rng(5))
+    expected = Compositor(*lists)
+    monkeypatch.setattr(compositor.kernels, 'fingerprints',
+                        lambda start, owner: np.zeros(len(start) - 1, np.uint64))
+    colliding = Compositor(*lists)
+    mask = np.arange(12) % 3 == 0
+    for energy in (expected, colliding):
+        energy.reset(mask)
+    assert expected.value == colliding.value
+    assert np.array_equal(expected.deltas(), colliding.deltas())
+    assert np.array_equal(expected.shown(), colliding.shown())

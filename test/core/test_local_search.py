@@ -106,3 +106,11 @@ def test_more_patience_is_never_worse():
 def test_nothing_to_choose_from():
     result = local_search(Compositor([0], [], [], [], [3.0]), np.random.default_rng(0))
     assert (result.energy, result.converged, len(result.mask)) == (3.0, True, 0)
+
+
+def test_members_that_nobody_sees_are_left_out():
+    # Candidate 1 lies wholly behind 0 and costs nothing.
+    energy = Compositor([0, 2, 4], [0, 1, 0, 1], [.5, .5, 1, 1], [0, 0, 1, 1], [2.0, 2.0])
+    energy.flip(1)
+    result = local_search(energy, np.random.default_rng(0))
+    assert np.array_equal(result.mask, [True, False])

@@ -7,7 +7,9 @@ Each pixel owns a run of *slots*: the candidates that cover it, nearest first, a
 for "no candidate". `owner[slot]` is the candidate, n for the last slot; `active` has n + 1
 entries, of which the last is always true, so that a scan down a run always ends. `first` and
 `second` hold, per pixel, the slots of the two nearest active owners (`second` is meaningless
-where `first` is the last slot). See core/compositor.py for the energy.
+where `first` is the last slot). Pixels with the same owners in the same order always show the
+same candidate, so they are merged into one with the sum of their costs; below, a pixel is
+such a merged one except in `build` and `merge`. See core/compositor.py for the energy.
 """
 
 import numba as nb
@@ -24,8 +26,8 @@ def build(offsets, pixel, depth, cost, cost_none):
     :param depth: (E,) float32; equal depths keep the candidates' order.
     :param cost: (E,) float32.
     :param cost_none: (P,) float32.
-    :return: owner (E + P,) int32, slot_cost (E + P,) float32, slot (E,) int32 of each entry,
-        start (P + 1,) int32 of each pixel's run, entry (E + P,) int32 of each slot, -1 for none.
+    :return: owner (E + P,) int32, slot_cost (E + P,) float32, start (P + 1,) int32 of each
+        pixel's run, entry (E + P,) int32 of each slot, -1 for none.
     """
     n, n_pixels, n_entries = offsets.shape[0] - 1, cost_none.shape[0], pixel.shape[0]
     start = np.zeros(n_pixels + 1, np.int32)
@@ -36,7 +38,6 @@ def build(offsets, pixel, depth, cost, cost_none):
     owner = np.full(n_entries + n_pixels, n, np.int32)
     slot_cost = np.empty(n_entries + n_pixels, np.float32)
     entry = np.full(n_entries + n_pixels, -1, np.int32)
-    slot = np.empty(n_entries, np.int32)
     filled = np.zeros(n_pixels, np.int32)
     for p in range(n_pixels):
         slot_cost[start[p + 1] - 1] = cost_none[p]
@@ -54,8 +55,63 @@ def build(offsets, pixel, depth, cost, cost_none):
     for p in range(n_pixels):
         for s in range(start[p], start[p + 1] - 1):
             slot_cost[s] = cost[entry[s]]
-            slot[entry[s]] = s
-    return owner, slot_cost, slot, start, entry
+    return owner, slot_cost, start, entry
+
+
+@nb.njit(cache=True)
+def fingerprints(start, owner):
+    """Return (P,) uint64, equal for runs of equal owners."""
+    out = np.empty(start.shape[0] - 1, np.uint64)
+    for p in range(out.shape[0]):
+        h = np.uint64(14695981039346656037)
+        for s in range(start[p], start[p + 1]):
+            h = (h ^ np.uint64(owner[s] + 1)) * np.uint64(1099511628211)
+            h ^= h >> np.uint64(29)
+        out[p] = h
+    return out
+
+
+@nb.njit(cache=True)
+def merge(start, owner, cost, n, kind, example):
+    """
+    Merge pixels of one kind.
+
+    :param kind: (P,) int64 merged pixel of each pixel; `example` (C,) int64, one of each kind.
+    :return: whether the pixels of every kind have equal runs; offsets (n + 1,) int64, pixel
+        (E',) int32 and slot (E',) int32 of the entries of each candidate, owner (S,) int32 and
+        cost (S,) float64 of the merged slots, start (C + 1,) int32 of their runs.
+    """
+    n_kinds = example.shape[0]
+    new_start = np.zeros(n_kinds + 1, np.int32)
+    for c in range(n_kinds):
+        new_start[c + 1] = new_start[c] + start[example[c] + 1] - start[example[c]]
+    new_owner = np.empty(new_start[n_kinds], np.int32)
+    new_cost = np.zeros(new_start[n_kinds])
+    offsets = np.zeros(n + 2, np.int64)
+    for c in range(n_kinds):
+        for i in range(new_start[c + 1] - new_start[c]):
+            k = owner[start[example[c]] + i]
+            new_owner[new_start[c] + i] = k
+            offsets[k + 1] += 1
+    for k in range(n):
+        offsets[k + 1] += offsets[k]
+    pixel, slot = np.empty(offsets[n], np.int32), np.empty(offsets[n], np.int32)
+    filled = offsets[:n].copy()
+    for c in range(n_kinds):
+        for s in range(new_start[c], new_start[c + 1] - 1):
+            k = new_owner[s]
+            pixel[filled[k]], slot[filled[k]] = c, s
+            filled[k] += 1
+    same = True
+    for p in range(kind.shape[0]):
+        to = new_start[kind[p]]
+        same &= start[p + 1] - start[p] == new_start[kind[p] + 1] - to
+        if not same:
+            break
+        for i in range(start[p + 1] - start[p]):
+            same &= owner[start[p] + i] == new_owner[to + i]
+            new_cost[to + i] += cost[start[p] + i]
+    return same, offsets[:n + 1], pixel, slot, new_owner, new_cost, new_start
 
 
 @nb.njit(cache=True)
@@ -74,14 +130,14 @@ def restart(active, owner, slot_cost, start, first, second, deltas):
         first[p] = t
         total += slot_cost[t]
         for s in range(start[p], t):
-            deltas[owner[s]] += np.float64(slot_cost[s]) - slot_cost[t]
+            deltas[owner[s]] += slot_cost[s] - slot_cost[t]
         second[p] = t
         if t < start[p + 1] - 1:
             u = t + 1
             while not active[owner[u]]:
                 u += 1
             second[p] = u
-            deltas[owner[t]] += np.float64(slot_cost[u]) - slot_cost[t]
+            deltas[owner[t]] += slot_cost[u] - slot_cost[t]
     return total
 
 
@@ -95,7 +151,7 @@ def add(k, offsets, pixel, slot, active, owner, slot_cost, start, first, second,
         if s < t:
             # k hides t: whatever lies in front of k is now compared with k, the slots between
             # k and t are hidden, t itself can go without a change, k can be taken away.
-            new, old = np.float64(slot_cost[s]), np.float64(slot_cost[t])
+            new, old = slot_cost[s], slot_cost[t]
             for q in range(start[p], s):
                 deltas[owner[q]] += old - new
             deltas[k] += 2.0 * (old - new)
@@ -108,7 +164,7 @@ def add(k, offsets, pixel, slot, active, owner, slot_cost, start, first, second,
         else:
             u = second[p]
             if s < u:
-                deltas[owner[t]] += np.float64(slot_cost[s]) - slot_cost[u]
+                deltas[owner[t]] += slot_cost[s] - slot_cost[u]
                 second[p] = s
 
 
@@ -129,7 +185,7 @@ def remove(k, offsets, pixel, slot, active, owner, slot_cost, start, first, seco
             while not active[owner[v]]:
                 v += 1
         if s == t:
-            old, new = np.float64(slot_cost[t]), np.float64(slot_cost[u])
+            old, new = slot_cost[t], slot_cost[u]
             for q in range(start[p], t):
                 deltas[owner[q]] += old - new
             deltas[k] -= 2.0 * (new - old)
@@ -140,7 +196,7 @@ def remove(k, offsets, pixel, slot, active, owner, slot_cost, start, first, seco
             first[p] = u
             second[p] = v
         elif s == u:
-            deltas[owner[t]] += np.float64(slot_cost[v]) - slot_cost[u]
+            deltas[owner[t]] += slot_cost[v] - slot_cost[u]
             second[p] = v
 
 

@@ -1,18 +1,21 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The command `hooc convert`: scene sets and BOP datasets become bags."""
+"""The command `hooc convert`: scene sets and BOP datasets to bags, calibrations to YAML."""
 
 from pathlib import Path
+
+from hooc_perception.errors import HoocError
 
 HELP = 'write a scene set or BOP dataset as rosbag2 bags, one a scene'
 
 
 def add_arguments(parser):
     """Declare the command's arguments."""
-    parser.add_argument('set', type=Path, metavar='SET', help='scene set or BOP dataset')
+    parser.add_argument('set', type=Path, metavar='SET', nargs='?',
+                        help='scene set (docs/scene_sets.md) or BOP dataset')
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
-                        help='folder of the bags')
-    parser.add_argument('--scene', action='append', default=[], metavar='ID', nargs='+',
+                        help='folder of the bags; with --calibration the cameras.yaml')
+    parser.add_argument('--scene', action='extend', default=[], metavar='ID', nargs='+',
                         help='only these scenes')
     parser.add_argument('--storage', choices=('mcap', 'sqlite3'), default='mcap',
                         help='storage of the bags (default: mcap)')
@@ -20,16 +23,55 @@ def add_arguments(parser):
                         help='frame sets in a bag: the same images with new stamps (default: 1)')
     parser.add_argument('--rate', type=float, default=10.0, metavar='HZ',
                         help='frame sets a second (default: 10)')
+    parser.add_argument('--calibration', action='extend', default=[], metavar='NAME=FILE[#VIEW]',
+                        nargs='+', help="instead of SET: Calib_Results.mat or .m of Bouguet's "
+                        'toolbox, one a camera; VIEW is the calibration image in which the board '
+                        'lay on the table, or left or right of a stereo pair')
+    parser.add_argument('--unit', type=float, default=0.001, metavar='METRES',
+                        help='unit in which the calibration board was measured (default: 0.001)')
 
 
 def run(args):
-    """Write the bags; print where they are."""
+    """Write the bags, or the cameras.yaml of calibrations; print where they are."""
+    if bool(args.calibration) == bool(args.set):
+        raise HoocError('give either SET or --calibration, see hooc convert --help')
+    if args.calibration:
+        write_calibrations(args.calibration, args.unit, args.out)
+    else:
+        write_bags(args)
+
+
+def write_bags(args):
+    """Write one bag a scene."""
     from hooc_perception.replay.bag_writer import write_bag
     from hooc_perception.scenes.scene_set import load_scene_set
     from tqdm import tqdm
 
-    chosen = [name for names in args.scene for name in names]
-    scene_set = load_scene_set(args.set).selected(chosen)
+    scene_set = load_scene_set(args.set).selected(args.scene)
     for scene in tqdm(scene_set.scenes, desc='bags', unit='scene'):
         write_bag(scene, scene_set, args.out, args.storage, args.repeat, args.rate)
-    print(f'{len(scene_set.scenes)} bags in {args.out}')
+    count = len(scene_set.scenes)
+    print(f'{count} bag{"s" * (count != 1)} in {args.out}')
+
+
+def write_calibrations(entries, unit, out):
+    """Write a cameras.yaml from entries NAME=FILE[#VIEW]."""
+    from hooc_perception.scenes.bouguet import load_bouguet, upright
+    from hooc_perception.scenes.camera_files import write_cameras
+    from hooc_perception.scenes.files import unique
+
+    if not 1e-6 <= unit <= 1:
+        raise HoocError(f'--unit is {unit:g}; give metres, 0.001 for a board in millimetres')
+    cameras = []
+    for entry in entries:
+        name, _, file = entry.partition('=')
+        file, _, view = file.partition('#')
+        if not file:
+            raise HoocError(f'--calibration {entry}: no file is named; write NAME=FILE, such as '
+                            'kinect1=left/Calib_Results.mat')
+        cameras.append(load_bouguet(file, name, view or None, unit))
+    unique([camera.name for camera in cameras], '--calibration')
+    if out.exists():
+        raise HoocError(f'{out}: exists already; remove it or choose another file')
+    write_cameras(out, upright(cameras))
+    print(f'{len(cameras)} cameras in {out}')

@@ -13,7 +13,7 @@ import re
 from hooc_perception.core.geometry import inverse, pose_from_matrix
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
-from hooc_perception.scenes import camera_files, files
+from hooc_perception.scenes import camera_files, files, png
 from hooc_perception.scenes.scene import Category, Scene, TrueObject
 import numpy as np
 
@@ -112,7 +112,7 @@ def _shot(folder, key, shot, name):
     """Return (Camera in the source world, depth file, metres per count) of one image."""
     where = f'{folder / "scene_camera.json"}: {key}'
     file = folder / 'depth' / f'{int(key):06d}.png'
-    width, height = files.png_size(file)
+    width, height = png.png_size(file)
     K = camera_files.intrinsics(files.required(shot, 'cam_K', where), width, height,
                                 f'{where} cam_K')
     scale = files.number(shot.get('depth_scale', 1.0), f'{where} depth_scale')

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
 from hooc_perception.core.types import DepthView
-from hooc_perception.scenes import files
+from hooc_perception.scenes import png
 from hooc_perception.scenes.support_plane import estimate_table_frame
 import numpy as np
 
@@ -110,14 +110,14 @@ class Scene:
         """Return {camera: (H, W) uint8 instance labels, 0 = none}, None where there are none."""
         if not self.label_files:
             return None
-        return {camera.name: files.read_png(self.label_files[camera.name], camera.width,
+        return {camera.name: png.read_png(self.label_files[camera.name], camera.width,
                                             camera.height, 8)
                 for camera in self.source_cameras if camera.name in self.label_files}
 
     @property
     def _depth_images(self):
         """Return the depth images, read anew each time: scenes are many, memory is not."""
-        return tuple(files.read_depth_png(path, camera.width, camera.height, unit)
+        return tuple(png.read_depth_png(path, camera.width, camera.height, unit)
                      for path, camera, unit in zip(self.depth_files, self.source_cameras,
                                                    self.depth_units))
 

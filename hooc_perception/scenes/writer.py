@@ -7,7 +7,7 @@ from pathlib import Path
 
 from hooc_perception.core.depth_encodings import counts_from_depth
 from hooc_perception.errors import HoocError
-from hooc_perception.scenes import camera_files, files
+from hooc_perception.scenes import camera_files, files, png
 import numpy as np
 import yaml
 
@@ -81,9 +81,9 @@ def write_scene(folder, scene, set_cameras, depth_unit=0.001):
         if np.shape(depth) != (camera.height, camera.width):
             raise HoocError(f'{folder}: the depth of {camera.name} has shape {np.shape(depth)}, '
                             f'its camera ({camera.height}, {camera.width}); make them agree')
-        files.write_png(folder / f'{camera.name}.png', counts_from_depth(depth, depth_unit))
+        png.write_png(folder / f'{camera.name}.png', counts_from_depth(depth, depth_unit))
     for camera, labels in (scene.labels or {}).items():
-        files.write_png(folder / f'{camera}_labels.png', np.asarray(labels, np.uint8))
+        png.write_png(folder / f'{camera}_labels.png', np.asarray(labels, np.uint8))
     if scene.cameras:
         camera_files.write_cameras(folder / 'cameras.yaml', scene.cameras)
     if scene.truth is not None:

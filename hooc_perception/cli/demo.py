@@ -1,0 +1,131 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`hooc demo`: the bundled scene through the five nodes, beside the truth."""
+
+from argparse import Namespace
+from dataclasses import replace
+from pathlib import Path
+import shutil
+import sys
+import tempfile
+
+from hooc_perception.errors import HoocError
+
+HELP = ('Replay the bundled scene through the five nodes as separate processes, print the '
+        'objects found beside the truth, and write a report with pictures.')
+SCENE, MODEL = Path('bags') / 'demo', Path('models') / 'demo'
+# The bundled scene: of a twin that no benchmark uses.
+TWIN_SEED, TWIN_SCENE = 2016, '10_1'
+
+
+def add_arguments(parser):
+    """Declare the arguments."""
+    parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
+                        help='folder for the results and the report (default: %(default)s)')
+    parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
+                        help='default: the one the bundled model was trained for')
+    parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
+    parser.add_argument('--timeout', type=float, default=300.0, metavar='S',
+                        help='how long the scene may take (default: %(default)g s)')
+    parser.add_argument('--verbose', action='store_true', help='show all that the nodes log')
+    parser.add_argument('--make-bundle', action='store_true',
+                        help='first make the bundled scene and model again, from nothing but '
+                        'seeds (takes as long as hooc train)')
+
+
+def run(args):
+    """Run the command; return the exit code."""
+    root = bundle_root(must_exist=not args.make_bundle)
+    if args.make_bundle:
+        make_bundle(root, args.profile or 'best')
+    from hooc_perception.cli import run as run_command
+    from hooc_perception.evaluation.tables import to_text
+    from hooc_perception.models.folder import load_model_folder
+    from hooc_perception.replay.bag_reader import BagScene
+    from hooc_perception.scenes.results import load_results
+    results = args.out / 'results.json'
+    args.out.mkdir(parents=True, exist_ok=True)
+    run_command.run(Namespace(
+        bags=[root / SCENE], model=root / MODEL, out=results, profile=args.profile,
+        seed=args.seed, report=args.out, timeout=args.timeout, params=None,
+        verbose=args.verbose))
+    models = {model.name: model for model in load_model_folder(root / MODEL).models}
+    entry = load_results(results)['scenes'][0]
+    print('\n' + to_text(comparison(entry, BagScene(root / SCENE).truth, models)))
+    print(f'\nresults: {results.resolve()}\nreport:  {(args.out / "report.html").resolve()}')
+
+
+def bundle_root(must_exist=True):
+    """
+    Return the folder that holds the bundled scene and model: the source tree, or share/.
+
+    :raises HoocError: where neither holds them and `must_exist`.
+    """
+    source = Path(__file__).resolve().parents[2]
+    places = [source, Path(sys.prefix) / 'share' / 'hooc_perception',
+              # colcon installs into <prefix>/lib/python3.x/site-packages
+              source.parents[2] / 'share' / 'hooc_perception']
+    for place in places:
+        if (place / SCENE / 'metadata.yaml').is_file() and (place / MODEL).is_dir():
+            return place
+    if must_exist:
+        raise HoocError(f'the bundled scene and model are not in {source}; make them with '
+                        '"make bundle" in the source tree')
+    return source
+
+
+def make_bundle(root, profile):
+    """
+    Write the bundled scene and model into `root` anew; the same code gives the same bundle.
+
+    The model is trained on generic meshes and cameras; the scene is not part of it.
+    """
+    from hooc_perception.replay.bag_writer import write_bag
+    from hooc_perception.scenes.scene_set import load_scene_set
+    from hooc_perception.synthesis.twin import TwinOptions, write_twin
+    from hooc_perception.training.train import train
+    with tempfile.TemporaryDirectory() as folder:
+        twin = Path(folder) / 'twin'
+        write_twin(twin, TWIN_SEED, TwinOptions(scenes=(TWIN_SCENE,)), progress=True)
+        scene_set = load_scene_set(twin)
+        train(scene_set, root / MODEL, profile, seed=0)
+        shutil.rmtree(root / SCENE, ignore_errors=True)
+        write_bag(replace(scene_set.scenes[0], name=SCENE.name), scene_set, root / SCENE.parent)
+    size = sum(path.stat().st_size for part in (SCENE, MODEL)
+               for path in (root / part).rglob('*') if path.is_file())
+    print(f'bundle: {root / SCENE} and {root / MODEL}, {size / 1e6:.1f} MB together')
+
+
+def comparison(entry, truth, models):
+    """
+    Return the Table of what was found beside the truth.
+
+    :param entry: one scene of a results file.
+    :param truth: sequence of TrueObject.
+    :param models: {category: GenericModel}.
+    """
+    from hooc_perception.evaluation.matching import posed
+    from hooc_perception.evaluation.scores import score_objects
+    from hooc_perception.evaluation.tables import Table
+    estimates = [posed(found) for found in entry['objects']]
+    scores = score_objects(estimates, [posed(true) for true in truth], models)
+    matched = {score.estimate for score in scores}
+    rows = []
+    for score in scores:
+        found = score.estimate is not None
+        rows.append((score.category, 'yes' if found else 'no',
+                     'yes' if score.localized else 'no',
+                     f'{1000 * score.centre_m:.0f}' if found else None,
+                     estimates[score.estimate].score if found else None))
+    false = [estimate for i, estimate in enumerate(estimates) if i not in matched]
+    rows += [(estimate.category, 'not there', None, None, estimate.score) for estimate in false]
+    count = len(scores)
+    n_found = sum(score.estimate is not None for score in scores)
+    n_placed = sum(score.localized for score in scores)
+    return Table(
+        'Objects found beside the truth', ('object', 'found', 'localized', 'error mm', 'score'),
+        tuple(rows), (
+            '',
+            f'{n_found} of {count} found, {n_placed} localized, {len(false)} not there; '
+            f'{entry["seconds"]:.1f} s from the last image to the answer.',
+            "Localized: the centre is within half the generic model's size of the true one."))

@@ -44,12 +44,14 @@ def add_arguments(parser):
 def run(args):
     """Run the command; return the exit code."""
     from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models, table_1
+    from hooc_perception.models.folder import load_model_folder
     from hooc_perception.scenes.results import load_results
     from hooc_perception.scenes.scene_set import load_scene_set
 
     if args.stages and not args.model:
         raise HoocError('--stages runs the chain again and needs a trained model; '
                         'give its folder with --model')
+    folder = load_model_folder(args.model) if args.model else None
     scene_set = load_scene_set(args.set).selected(args.scene)
     contents = [load_results(path) for path in args.results]
     labels = _labels(args.results)
@@ -62,9 +64,9 @@ def run(args):
                                     visibility if args.bop else None)
                    for label, content in zip(labels, contents)]
     truth_energy, stages = {}, {}
-    if args.model:
+    if folder:
         from hooc_perception.evaluation.rerun import rerun
-        truth_energy, stages = rerun(scene_set, args.model, args.stages)
+        truth_energy, stages = rerun(scene_set, folder, args.stages)
     tables = _tables(evaluations, scene_set, visibility, truth_energy, stages)
     if args.visibility or not contents:
         tables = [*_visibility_tables(visibility), *tables]

@@ -30,6 +30,7 @@ def run(args):
     from hooc_perception.evaluation.evaluate import scoring_models
     from hooc_perception.evaluation.report.page import write_report
     from hooc_perception.evaluation.report.scene import report_scene
+    from hooc_perception.models.folder import load_model_folder
     from hooc_perception.scenes.results import load_results
     from hooc_perception.scenes.scene_set import load_scene_set
     from tqdm import tqdm
@@ -37,6 +38,7 @@ def run(args):
     if args.candidates and not args.model:
         raise HoocError('--candidates runs the chain again and needs a trained model; '
                         'give its folder with --model')
+    folder = load_model_folder(args.model) if args.model else None
     results = load_results(args.results)
     scene_set = load_scene_set(args.set).selected(args.scene)
     entries = {entry['scene']: entry for entry in results['scenes']}
@@ -46,9 +48,9 @@ def run(args):
                         f'{" among " + ", ".join(args.scene) if args.scene else ""}; '
                         'give the set that the results are of')
     models, extras = scoring_models(scene_set), None
-    if args.model:
+    if folder:
         from hooc_perception.evaluation.rerun import Rerun
-        extras = Rerun(args.model)
+        extras = Rerun(folder)
         models = {model.name: model for model in extras.models}
     scenes = []
     for scene in tqdm(shown, desc='pictures', unit='scene', disable=None):

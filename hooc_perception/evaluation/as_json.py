@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every score as plain data, for --json."""
 
-from dataclasses import asdict
+from dataclasses import asdict, is_dataclass
 import math
 
 from hooc_perception.evaluation import paper
@@ -13,6 +13,8 @@ import numpy as np
 
 def plain(value):
     """Return a value as JSON knows it: NaN and infinity become null, arrays become lists."""
+    if is_dataclass(value):
+        value = asdict(value)
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (list, tuple)):

@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass, replace
 
+from hooc_perception.core.kernels import raster
 from hooc_perception.core.render import projected, render_depth, render_patch
 from hooc_perception.evaluation.errors import world_mesh
 import numpy as np
@@ -12,7 +13,8 @@ SAMPLES = 4000
 # Rendered this much finer than the camera, a surface seen at a grazing angle moves little in
 # depth from one pixel to the next, and the tolerance can stay below the thickness of a glass.
 ZOOM = 3
-TOLERANCE_M = 0.002
+TOLERANCE_M = 0.001
+MAX_SLANT_M = 0.01
 
 
 @dataclass(frozen=True)
@@ -105,16 +107,21 @@ def scene_visibility(objects, models, cameras, rng, samples=SAMPLES):
 def _sees(points, normals, outward, camera, depth, own):
     """Return (n,) bool: the surface points that the camera sees in a composed rendering."""
     uvz = projected(points, camera)
-    u, v = np.rint(uvz[:, 0]).astype(int), np.rint(uvz[:, 1]).astype(int)
-    inside = ((uvz[:, 2] > 0) & (u >= 1) & (v >= 1)
+    ahead = uvz[:, 2] > raster.NEAR_M
+    u, v = np.rint(np.where(ahead[:, None], uvz[:, :2], -1)).clip(-1, 1e6).astype(int).T
+    inside = (ahead & (u >= 1) & (v >= 1)
               & (u < camera.width - 1) & (v < camera.height - 1))
     u, v = np.where(inside, u, 1), np.where(inside, v, 1)
+    ray = camera.T_world_camera[:3, 3] - points
+    cosine = np.einsum('ij,ij->i', normals, ray) / np.linalg.norm(ray, axis=1)
+    # From one pixel to the next a slanted surface gains this much depth.
+    slope = uvz[:, 2] / camera.K[0, 0] / np.maximum(np.abs(cosine), 1e-3)
+    limit = uvz[:, 2] - TOLERANCE_M - np.minimum(slope, MAX_SLANT_M)
     near = np.zeros(len(points), bool)
     # A pixel's neighbours too: the sample may lie beside the centre of a pixel at the outline.
     for du, dv in ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)):
         at = (v + dv, u + du)
-        near |= own[at] & (uvz[:, 2] <= depth[at] + TOLERANCE_M)
+        near |= own[at] & (limit <= depth[at])
     if outward:
-        eye = camera.T_world_camera[:3, 3]
-        near &= outward * np.einsum('ij,ij->i', normals, eye - points) > 0
+        near &= outward * cosine > 0
     return inside & near

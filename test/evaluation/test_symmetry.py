@@ -1,0 +1,65 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Symmetry groups and the rotation error over them."""
+
+from hooc_perception.evaluation.symmetry import is_ball, rotation_error, symmetry_rotations
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+
+@pytest.mark.parametrize('orders, size', [
+    ((1, 1, 1), 1), ((1, 1, 2), 2), ((2, 2, 2), 4), ((1, 1, 3), 3), ((2, 2, 4), 8),
+    ((4, 4, 4), 24), ((2, 2, 6), 12)])
+def test_finite_groups_have_their_known_size(orders, size):
+    group = symmetry_rotations(orders)
+    assert len(group) == size
+    np.testing.assert_allclose(group[0], np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(group), 1)
+
+
+def test_box_group_maps_the_box_onto_itself():
+    corners = np.array([[x, y, z] for x in (-3, 3) for y in (-2, 2) for z in (-1, 1.0)])
+    for R in symmetry_rotations((2, 2, 2)):
+        turned = corners @ R.T
+        gap = np.linalg.norm(turned[:, None] - corners[None], axis=-1).min(1)
+        assert gap.max() < 1e-9
+
+
+def test_orders_without_a_finite_group_still_count_axis_by_axis():
+    group = symmetry_rotations((6, 4, 1))
+    assert len(group) == 1 + 5 + 3
+
+
+def test_continuous_axis_with_flips_has_twice_the_steps():
+    assert len(symmetry_rotations((2, 2, 0))) == 2 * len(symmetry_rotations((1, 1, 0)))
+
+
+@pytest.mark.parametrize('orders', [(1, 1, 1), (2, 2, 2), (2, 2, 4), (1, 3, 1), (4, 4, 4)])
+def test_rotation_error_is_the_least_over_the_group(orders):
+    rng = np.random.default_rng(5)
+    for R_est, R_true in zip(Rotation.random(20, rng=rng), Rotation.random(20, rng=rng)):
+        expected = min((R_est.inv() * R_true * Rotation.from_matrix(S)).magnitude()
+                       for S in symmetry_rotations(orders))
+        assert rotation_error(R_est.as_matrix(), R_true.as_matrix(), orders) == pytest.approx(
+            expected, abs=1e-6)
+
+
+def test_turn_about_a_continuous_axis_costs_nothing_and_a_tilt_costs_itself():
+    R = Rotation.random(rng=np.random.default_rng(1))
+    turned = R * Rotation.from_euler('z', 1.234)
+    tilted = turned * Rotation.from_euler('x', 0.3)
+    upside = R * Rotation.from_euler('x', np.pi)
+    assert rotation_error(turned.as_matrix(), R.as_matrix(), (1, 1, 0)) == pytest.approx(
+        0, abs=1e-6)
+    assert rotation_error(tilted.as_matrix(), R.as_matrix(), (1, 1, 0)) == pytest.approx(0.3)
+    assert rotation_error(upside.as_matrix(), R.as_matrix(), (1, 1, 0)) == pytest.approx(np.pi)
+    assert rotation_error(upside.as_matrix(), R.as_matrix(), (2, 2, 0)) == pytest.approx(
+        0, abs=1e-6)
+
+
+def test_ball_has_no_rotation_error():
+    R_est, R_true = Rotation.random(2, rng=np.random.default_rng(2)).as_matrix()
+    assert is_ball((0, 0, 0)) and not is_ball((1, 1, 0))
+    assert rotation_error(R_est, R_true, (0, 0, 0)) == 0
+    assert rotation_error(R_est, R_true, (1, 1, 1)) > 0.1

@@ -11,6 +11,7 @@ from hooc_perception.core.observe import observe
 from hooc_perception.core.propose import propose
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.conversions import header
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_messages import candidates_messages, probabilities_from_message
@@ -30,6 +31,9 @@ class CandidateNode(StageNode):
         """Load the generic models, build the endpoints."""
         model = model_of(self.config)
         self.models = model.models
+        warmed(self, model, lambda views, probabilities, _, models: propose(
+            observe(views, self.parameters['observe']), probabilities, models,
+            self.parameters['propose'], stage_rng(self.config.seed, 'propose')))
         self.poses = self.publisher(PoseArray, 'candidates/poses')
         self.attributes = self.publisher(PointCloud2, 'candidates/attributes')
         self.input = ViewInput(self, camera_names(self.config, model),

@@ -9,6 +9,7 @@ from hooc_perception.core.classify import classify
 from hooc_perception.core.observe import observe
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.conversions import header, labels_message
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_messages import label_images, probabilities_message
@@ -29,6 +30,9 @@ class ClassificationNode(StageNode):
         model = model_of(self.config)
         self.names = camera_names(self.config, model)
         self.classes, self.classifier = [m.name for m in model.models], model.classifier
+        warmed(self, model, lambda views, *_: classify(
+            observe(views, self.parameters['observe']), self.classifier,
+            self.parameters['classify']))
         self.probabilities = self.publisher(PointCloud2, 'pixels/probabilities')
         self.labels = [self.publisher(Image, 'pixels/<camera>/labels', f'pixels/{name}/labels')
                        for name in self.names]

@@ -11,12 +11,14 @@ from hooc_perception.core.observe import rectify
 from hooc_perception.core.types import DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names
+from hooc_perception.nodes.warm_up import overhead_camera
 from hooc_perception.ros.camera_input import CameraInput, declared_pose, TfPoses
 from hooc_perception.ros.conversions import camera_from_messages, depth_from_message, nanoseconds
 from hooc_perception.ros.frame_sets import EXPLAINED, FrameSetConfig, FrameSets
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_node import StageConfig, StageNode
 from hooc_perception.ros.view_topics import ViewOutput
+import numpy as np
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,8 @@ class IngestionNode(StageNode):
     def configure(self):
         """Build the assembly and the endpoints of every camera."""
         self.names = camera_names(self.config)
+        if self.config.warm_up:
+            rectify(DepthView(overhead_camera(), np.ones((120, 160), np.float32)))
         self.sets = FrameSets(self.names, self.config)
         self.sent = None            # (stamp, node time) of the set that is not answered yet
         self.output = ViewOutput(self, self.names)

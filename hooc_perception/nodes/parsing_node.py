@@ -15,6 +15,7 @@ from hooc_perception.core.parse import parse
 from hooc_perception.core.unexplained import unexplained_points
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.detect_service import DetectService
 from hooc_perception.ros.object_output import ObjectOutput
 from hooc_perception.ros.spin import run_node
@@ -48,6 +49,7 @@ class ParsingNode(StageNode):
         self.models, self.enabled = model.models, True
         limit = self.config.max_instances
         self.max_instances = model.max_instances if limit < 0 else limit
+        warmed(self, model, self.try_out)
         self.output = ObjectOutput(self, model.models, [
             (model.mesh_path(m.name).resolve().as_uri(), model.mesh_sha256[m.name])
             for m in model.models])
@@ -58,6 +60,13 @@ class ParsingNode(StageNode):
         self.detect = DetectService(self)
         self.owned(self.destroy_service, self.create_service(SetBool, 'enable', self.on_enable))
         self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
+
+    def try_out(self, views, probabilities, candidates, models):
+        """Parse a made-up scene."""
+        observation = observe(views, self.parameters['observe'])
+        parsed = parse(observation, probabilities, candidates, models, self.parameters['parse'],
+                       stage_rng(self.config.seed, 'parse'), self.max_instances)
+        unexplained_points(observation, parsed.objects, models)
 
     def activate(self):
         """Say what the class ids mean."""

@@ -52,6 +52,11 @@ class Diagnostics:
         """Report and log trouble that stops the node from giving answers."""
         self._trouble(ERROR, thing, code, sentence)
 
+    def failed(self, code, sentence):
+        """Report that the node itself could not do what it was asked to; always logged."""
+        self._logged.pop(('node', code), None)
+        self._trouble(ERROR, 'node', code, sentence)
+
     def _trouble(self, level, thing, code, sentence):
         now = time.monotonic()
         self._counts[thing, code] += 1
@@ -59,7 +64,12 @@ class Diagnostics:
         if now - self._logged.get((thing, code), -THROTTLE_S) >= THROTTLE_S:
             self._logged[thing, code] = now
             logger = self._node.get_logger()
-            (logger.error if level == ERROR else logger.warning)(f'{thing}: {sentence}')
+            text = sentence if thing == 'node' else f'{thing}: {sentence}'
+            # Two calls: rclpy wants one severity a line of code.
+            if level == ERROR:
+                logger.error(text)
+            else:
+                logger.warning(text)
 
     def statuses(self):
         """Return the list of DiagnosticStatus as of now."""

@@ -35,6 +35,8 @@ class StageConfig(Config):
     target_frame: str = param('table', 'Frame of all results: z up, z = 0 is the table top.')
     seed: int = param(0, 'Seed of every random choice; the stages derive theirs from it.',
                       '', 0, 2 ** 31 - 1)
+    warm_up: bool = param(True, 'Try the stage on a made-up scene while configuring, so that the '
+                          'first answer does not wait for compiled code.')
 
 
 class StageNode(LifecycleNode):
@@ -175,11 +177,11 @@ class StageNode(LifecycleNode):
             step()
             return True
         except HoocError as error:
-            self.diagnostics.error('node', f'{what}_failed', str(error))
+            self.diagnostics.failed(f'{what}_failed', str(error))
         except Exception as error:
             # rclpy would swallow it, and the transition would fail without a word.
-            self.diagnostics.error('node', f'{what}_failed',
-                                   f'unexpected {type(error).__name__}: {error}')
+            self.diagnostics.failed(f'{what}_failed',
+                                    f'unexpected {type(error).__name__}: {error}')
         return False
 
     def _destroy(self):

@@ -3,6 +3,7 @@
 """A node as a process: start it, pass on what it says, notice its end, end it."""
 
 from collections import deque
+import re
 import signal
 import subprocess
 import sys
@@ -55,7 +56,7 @@ class NodeProcess:
         self._reader.join(0.5 if self.exit_code() is not None else 0)
         lines = [line for line in self._lines if line]
         errors = [line for line in lines if line.startswith(('[ERROR]', '[FATAL]'))]
-        return (errors or lines or ['it said nothing'])[-1]
+        return re.sub(r'^\[(ERROR|FATAL)\] ', '', (errors or lines or ['it said nothing'])[-1])
 
     def ask_to_stop(self):
         """Send SIGINT, which rclpy turns into an orderly end."""

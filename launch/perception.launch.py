@@ -1,0 +1,80 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The four nodes of the chain for live cameras, brought to active one after the other.
+
+For ROS installations; elsewhere `hooc up` does the same.
+
+    ros2 launch hooc_perception perception.launch.py model:=MODEL [cameras:="[left, right]"]
+"""
+
+import os
+
+from ament_index_python.packages import get_package_share_directory
+from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
+from launch.conditions import IfCondition
+from launch.events import matches_action
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import LifecycleNode
+from launch_ros.event_handlers import OnStateTransition
+from launch_ros.events.lifecycle import ChangeState
+from lifecycle_msgs.msg import Transition
+import yaml
+
+from launch import LaunchDescription
+
+CHAIN = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node')
+
+
+def lifecycle_node(name, namespace, parameters, autostart):
+    """Return the actions that start one node and, with `autostart`, bring it to active."""
+    node = LifecycleNode(package='hooc_perception', executable=name, name=name,
+                         namespace=namespace, parameters=parameters, output='screen')
+
+    def change(transition):
+        return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(node),
+                                           transition_id=transition),
+                         condition=IfCondition(autostart))
+
+    activate = RegisterEventHandler(OnStateTransition(
+        target_lifecycle_node=node, start_state='configuring', goal_state='inactive',
+        entities=[change(Transition.TRANSITION_ACTIVATE)]))
+    return [node, activate, change(Transition.TRANSITION_CONFIGURE)]
+
+
+def chain(context):
+    """Return the actions of the four nodes; only now are the arguments known as text."""
+    given = {name: LaunchConfiguration(name).perform(context) for name in (
+        'model', 'profile', 'cameras', 'target_frame', 'seed', 'use_sim_time', 'params_file')}
+    own = {'model': os.path.abspath(os.path.expanduser(given['model'])),
+           'profile': given['profile'], 'target_frame': given['target_frame'],
+           'seed': int(given['seed']), 'use_sim_time': given['use_sim_time'].lower() == 'true'}
+    cameras = yaml.safe_load(given['cameras'])
+    if cameras:
+        own['cameras'] = cameras
+    actions = []
+    for name in CHAIN:
+        actions += lifecycle_node(name, LaunchConfiguration('namespace'),
+                                  [given['params_file'], own], LaunchConfiguration('autostart'))
+    return actions
+
+
+def generate_launch_description():
+    """Return the description that `ros2 launch` runs."""
+    params = os.path.join(get_package_share_directory('hooc_perception'), 'config',
+                          'perception.yaml')
+    return LaunchDescription([
+        DeclareLaunchArgument('model', description='folder that hooc train wrote'),
+        DeclareLaunchArgument('profile', default_value='',
+                              description="paper, best or fast; empty takes the model's"),
+        DeclareLaunchArgument('cameras', default_value='[]',
+                              description="names as a list; empty takes the model's"),
+        DeclareLaunchArgument('target_frame', default_value='table'),
+        DeclareLaunchArgument('seed', default_value='0'),
+        DeclareLaunchArgument('namespace', default_value='hooc'),
+        DeclareLaunchArgument('use_sim_time', default_value='false'),
+        DeclareLaunchArgument('autostart', default_value='true',
+                              description='configure and activate the nodes'),
+        DeclareLaunchArgument('params_file', default_value=params),
+        OpaqueFunction(function=chain),
+    ])

@@ -1,0 +1,128 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Real processes: started, brought to active, watched, ended, however the parent ends."""
+
+import os
+from pathlib import Path
+import signal
+import subprocess
+import sys
+import time
+
+from hooc_perception.errors import HoocError
+import pytest
+
+pytest.importorskip('rclpy')
+
+from hooc_perception.supervisor import environment  # noqa: E402
+from hooc_perception.supervisor.supervisor import Supervisor  # noqa: E402
+
+PARENT = """
+import sys
+from hooc_perception.supervisor.supervisor import Supervisor
+with Supervisor(('replay_node', 'ingestion_node'), isolated=True) as supervisor:
+    print(*[p.pid for p in supervisor.processes.values()], flush=True)
+    while True:
+        supervisor.spin(0.1)
+"""
+
+
+def alive(pid):
+    """Return whether a process runs (a zombie does not)."""
+    try:
+        return Path(f'/proc/{pid}/stat').read_text().rsplit(')', 1)[1].split()[0] != 'Z'
+    except (FileNotFoundError, ProcessLookupError):
+        return False
+
+
+def gone(pids, timeout_s=15.0):
+    """Wait for processes to end; return those that do not."""
+    deadline = time.monotonic() + timeout_s
+    while (left := [pid for pid in pids if alive(pid)]) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    return left
+
+
+@pytest.fixture(autouse=True)
+def quiet_domain(monkeypatch):
+    """Keep what `isolate` puts into the environment from leaking into other tests."""
+    for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE',
+                 *environment.FAST_DDS_VARIABLES):
+        monkeypatch.delenv(name, raising=False)
+        monkeypatch.setenv(name, '')
+        monkeypatch.delenv(name)
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
+def test_nothing_is_left_behind(number):
+    if sys.platform != 'linux':
+        pytest.skip('reads /proc')
+    parent = subprocess.Popen([sys.executable, '-c', PARENT], stdout=subprocess.PIPE, text=True,
+                              stderr=subprocess.DEVNULL)
+    pids = [int(word) for word in parent.stdout.readline().split()]
+    assert len(pids) == 2 and all(alive(pid) for pid in pids)
+    parent.send_signal(number)
+    parent.communicate(timeout=20)
+    assert parent.returncode != 0
+    assert gone(pids) == []
+
+
+def test_a_death_is_noticed_and_named():
+    with Supervisor(('replay_node',), isolated=True) as supervisor:
+        process = supervisor.processes['replay_node']
+        os.kill(process.pid, signal.SIGKILL)
+        with pytest.raises(HoocError, match='replay_node ended unexpectedly'):
+            supervisor.wait(lambda: False, 10.0, 'the death was not noticed')
+    assert not alive(process.pid)
+
+
+def test_failed_transitions_and_refused_parameters_say_why(tmp_path):
+    with Supervisor(('replay_node',), isolated=True) as supervisor:
+        with pytest.raises(HoocError, match='parameter bag is empty'):
+            supervisor.bring_up()
+        supervisor.set_parameters('replay_node', {'bag': str(tmp_path / 'none')})
+        with pytest.raises(HoocError, match='there is no such bag'):
+            supervisor.bring_up()
+        with pytest.raises(HoocError, match='replay_node: .*rate'):
+            supervisor.set_parameters('replay_node', {'rate': -1.0})
+
+
+def test_a_broken_parameter_file_ends_in_a_sentence(tmp_path):
+    bad = tmp_path / 'bad.yaml'
+    bad.write_text('/**:\n  ros__parameters:\n    rate: fast\n')
+    with pytest.raises(HoocError, match='rate'):
+        with Supervisor(('replay_node',), isolated=True, params_file=bad):
+            pass
+    with pytest.raises(HoocError, match='no such file'):
+        Supervisor(('replay_node',), params_file=tmp_path / 'missing.yaml')
+
+
+def test_the_shipped_parameter_file_is_accepted(repository):
+    with Supervisor(('replay_node', 'ingestion_node'), isolated=True,
+                    params_file=repository / 'config' / 'perception.yaml'):
+        pass
+
+
+def test_parallel_runs_get_domains_of_their_own():
+    claims = [environment.claim_domain() for _ in range(20)]
+    assert len({domain for domain, _ in claims}) == 20
+    for _, claim in claims:
+        claim.close()
+
+
+def test_a_domain_of_the_user_is_respected(monkeypatch):
+    monkeypatch.setenv('ROS_DOMAIN_ID', '77')
+    assert environment.isolate() is None
+    assert os.environ['ROS_DOMAIN_ID'] == '77'
+
+
+def test_large_segments_only_where_there_is_room(monkeypatch, tmp_path):
+    monkeypatch.setattr(environment, 'SHARED_MEMORY', tmp_path / 'none')
+    assert not environment.use_large_segments()
+    monkeypatch.setattr(environment, 'SHARED_MEMORY', tmp_path)
+    monkeypatch.setattr(environment, 'SEGMENT_BYTES', 2 ** 60)
+    assert not environment.use_large_segments()
+    monkeypatch.setattr(environment, 'SEGMENT_BYTES', 1)
+    assert environment.use_large_segments()
+    assert Path(os.environ['FASTDDS_DEFAULT_PROFILES_FILE']).is_file()
+    assert not environment.use_large_segments(), "a profile that is set is the user's"

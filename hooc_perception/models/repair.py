@@ -25,6 +25,8 @@ import trimesh
 SHEET_M = 0.0025
 # A hole is small when its cap has less than this share of the part's area.
 SMALL_HOLE = 0.02
+MAX_PARTS = 300
+# Grid points times samples, at most, in the level set; bounds its time to a second or two.
 GRID_WORK = 1.5e8
 SOUP_SAMPLES = 2000
 
@@ -37,7 +39,7 @@ def closed(mesh):
         wound or free of self-intersections.
     """
     parts = [_solid_part(part) for part in _parts(mesh)]
-    if all(part is not None for part in parts):
+    if parts and all(part is not None for part in parts):
         solid = _unite(parts)
         if solid is not None:
             return solid
@@ -65,8 +67,15 @@ def _is_solid(mesh):
 
 
 def _parts(mesh):
-    """Return the parts of a mesh that share edges, each consistently wound where possible."""
+    """
+    Return the parts of a mesh that share edges, each consistently wound where possible.
+
+    A soup of more than MAX_PARTS has no parts that mean anything: the list is empty then.
+    """
     mesh = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    labels = trimesh.graph.connected_component_labels(mesh.face_adjacency, len(mesh.faces))
+    if labels.max() >= MAX_PARTS:
+        return []
     if not mesh.is_winding_consistent:
         trimesh.repair.fix_winding(mesh)
     return list(mesh.split(only_watertight=False))
@@ -180,25 +189,33 @@ def _unite(parts):
 
 def _level_set(mesh):
     """
-    Return the solid of points whose winding number is over 1/2 or that are near the surface.
+    Return the solid of points whose winding number is over 1/2 or that are near a sheet.
 
-    Works for any triangle soup. Its surface lies within about one grid cell, longest side / 48
-    for small meshes, of the given one.
+    Works for any triangle soup. A sheet is where neither side of the surface is inside. The
+    result's surface lies within about one grid cell, longest side / 48 for small meshes, of
+    the given one.
     """
-    samples, face = trimesh.sample.sample_surface_even(mesh, SOUP_SAMPLES, seed=0)
-    normals = mesh.face_normals[face]
-    dense = cKDTree(trimesh.sample.sample_surface(mesh, 10 * SOUP_SAMPLES, seed=0)[0])
+    samples, face = trimesh.sample.sample_surface(mesh, SOUP_SAMPLES, seed=0)
+    normals = np.ascontiguousarray(mesh.face_normals[face])
+    samples = np.ascontiguousarray(samples)
     step = max(mesh.extents.max() / 48, SHEET_M / 2,
                np.cbrt(np.prod(mesh.extents + 2 * SHEET_M) * len(samples) / GRID_WORK))
-    lower, upper = mesh.bounds[0] - 2 * step, mesh.bounds[1] + 2 * step
-    axes = [np.arange(a, b + step, step) for a, b in zip(lower, upper)]
-    grid = np.stack(np.meshgrid(*axes, indexing='ij'), -1).reshape(-1, 3)
-    distance = dense.query(grid)[0]
     reach = max(SHEET_M / 2, 0.6 * step)
-    inside = np.abs(_winding(grid, np.ascontiguousarray(samples), np.ascontiguousarray(normals),
-                             mesh.area / len(samples))) > 0.5
-    field = np.where(inside, distance, reach - distance).reshape([len(a) for a in axes])
 
+    def inside(points):
+        return np.abs(_winding(points, samples, normals, mesh.area / len(samples))) > 0.5
+
+    lower = mesh.bounds[0] - 2 * step
+    axes = [np.arange(a, b + 3 * step, step) for a, b in zip(lower, mesh.bounds[1])]
+    grid = np.stack(np.meshgrid(*axes, indexing='ij'), -1).reshape(-1, 3)
+    dense, face = trimesh.sample.sample_surface(mesh, 10 * SOUP_SAMPLES, seed=0)
+    beside = 2 * reach * mesh.face_normals[face]
+    sheet = dense[~inside(dense + beside) & ~inside(dense - beside)]
+    field = cKDTree(dense).query(grid)[0]
+    field = np.where(inside(grid), field, -field)
+    if len(sheet):
+        field = np.maximum(field, reach - cKDTree(sheet).query(grid)[0])
+    field = field.reshape([len(a) for a in axes])
     solid = manifold3d.Manifold.level_set(_trilinear(field, lower, step),
                                           [*lower, *(lower + (np.array(field.shape) - 1) * step)],
                                           step)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
+from hooc_perception.scenes import files
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import get_typestore, Stores
@@ -80,6 +81,9 @@ def _reading(path):
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
         raise HoocError(f'{path}: metadata.yaml is missing, so this is no rosbag2 folder or its '
                         'recording was cut off; run "ros2 bag reindex" or record again')
+    if path.is_dir():
+        # Size and depth are bounded here; rosbags would take anything.
+        files.read_yaml(path / 'metadata.yaml')
     try:
         with Reader(path) as reader:
             yield reader

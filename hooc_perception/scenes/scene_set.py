@@ -15,6 +15,8 @@ from hooc_perception.scenes.writer import FORMAT, NewScene, write_scene_set
 # Class ids and instance labels travel as 8-bit images in which 0 is the background.
 MAX_CATEGORIES = 255
 MAX_METRES = 1000.0
+# The world_frame of sets whose poses are not in a table's frame.
+UNKNOWN_WORLD = 'unknown'
 
 __all__ = ['Category', 'NewScene', 'Scene', 'SceneSet', 'TrueObject', 'load_scene_set',
            'write_scene_set']
@@ -102,18 +104,22 @@ def _load_hooc(path, with_scenes):
                         f'{file}: max_instances_per_category')
     known = path / 'cameras.yaml'
     set_cameras = camera_files.load_cameras(known) if known.is_file() else {}
-    folders = _scene_folders(path, needed=with_scenes or not set_cameras)
-    if set_cameras:
+    world = files.name(entry.get('world_frame', 'table'), f'{file}: world_frame')
+    own = bool(set_cameras) and world != UNKNOWN_WORLD
+    folders = _scene_folders(path, needed=with_scenes or not own)
+    scenes = tuple(_scene(folder, camera_names, set_cameras, unit, categories, world, path)
+                   for folder in (folders if with_scenes else ()))
+    if own:
         cameras = _chosen(camera_names, set_cameras, known, file)
-    else:
+    elif world != UNKNOWN_WORLD:
         cameras = _scene_cameras(folders[0], camera_names, {}, path)
-    scenes = ()
-    if with_scenes:
-        scenes = tuple(_scene(folder, camera_names, set_cameras, unit, categories, entry, path)
-                       for folder in folders)
+    else:
+        # Where the cameras stand above the table, only a scene's depth can tell.
+        cameras = _scene(folders[0], camera_names, set_cameras, unit, categories, world,
+                         path).cameras
     return SceneSet(path, files.name(entry.get('name', path.resolve().name), f'{file}: name'),
-                    files.name(entry.get('world_frame', 'table'), f'{file}: world_frame'),
-                    categories, cameras, limit, scenes)
+                    'table' if world == UNKNOWN_WORLD else world, categories, cameras, limit,
+                    scenes)
 
 
 def _categories(path, file, entry):
@@ -170,7 +176,7 @@ def _scene_cameras(folder, names, set_cameras, path):
                    path / 'dataset.yaml')
 
 
-def _scene(folder, camera_names, set_cameras, unit, categories, entry, path):
+def _scene(folder, camera_names, set_cameras, unit, categories, world, path):
     """Return the Scene of one folder below scenes/."""
     name = files.name(folder.name, f"{folder}: the name of a scene's folder")
     depth_files = tuple(folder / f'{camera}.png' for camera in camera_names)
@@ -184,7 +190,7 @@ def _scene(folder, camera_names, set_cameras, unit, categories, entry, path):
     truth = _truth(truth_file, categories) if truth_file.is_file() else None
     return Scene(name, _scene_cameras(folder, camera_names, set_cameras, path), depth_files,
                  (unit,) * len(depth_files), truth, labels,
-                 table_known=entry.get('world_frame') != 'unknown')
+                 table_known=world != UNKNOWN_WORLD)
 
 
 def _truth(file, categories):

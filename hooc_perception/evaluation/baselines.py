@@ -1,0 +1,181 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Local features and point pairs, category by category: what one would try first.
+
+Both register every generic model, at its own size, to the fused cloud of what stands on the
+table, and take the best fits one after another. They set the floor that joint parsing has to
+clear; nothing else in the package uses them.
+"""
+
+from dataclasses import dataclass
+import time
+
+from hooc_perception.core.config import Config, param
+from hooc_perception.core.geometry import back_project, pose_from_matrix, stage_rng
+from hooc_perception.core.observe import observe, rectify
+from hooc_perception.errors import HoocError
+from hooc_perception.evaluation.visibility import surface_samples
+from hooc_perception.scenes.results import write_results
+import numpy as np
+import open3d as o3d
+from scipy.spatial import cKDTree
+from tqdm import tqdm
+
+
+@dataclass(frozen=True)
+class BaselineConfig(Config):
+    """Parameters of both baselines; customary values, chosen without looking at scores."""
+
+    voxel_m: float = param(0.005, 'Side of the voxels that thin both clouds.', 'm', 0.001, 0.05)
+    feature_radius: float = param(5.0, 'Radius of the features, in voxels.', '', 2.0, 20.0)
+    iterations: int = param(100000, 'RANSAC draws of three correspondences.', '', 100, 10000000)
+    inlier_m: float = param(0.01, 'A model point this near to the scene is explained by it.', 'm',
+                            0.001, 0.05)
+    min_fit: float = param(0.35, 'Least share of explained model points; half of a model looks '
+                           'away from any one camera.', '', 0.0, 1.0)
+    min_fresh: float = param(0.5, 'Least share of the scene points that a model takes which no '
+                             'better one has taken.', '', 0.0, 1.0)
+
+
+def fused_cloud(views, voxel_m):
+    """Return an Open3D cloud, with normals, of what stands on the table in RectifiedViews."""
+    cloud = o3d.geometry.PointCloud()
+    for view in observe(views).views:
+        part = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(
+            back_project(view.depth, view.camera)[view.foreground]))
+        part = part.voxel_down_sample(voxel_m)
+        if not len(part.points):
+            continue
+        part.estimate_normals(o3d.geometry.KDTreeSearchParamHybrid(3 * voxel_m, 30))
+        part.orient_normals_towards_camera_location(view.camera.T_world_camera[:3, 3])
+        cloud += part
+    return cloud.voxel_down_sample(voxel_m)
+
+
+def model_cloud(model, voxel_m, rng, samples=20000):
+    """Return an Open3D cloud, with normals, of a GenericModel's surface."""
+    points, normals = surface_samples(model.vertices, model.faces, samples, rng)
+    cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
+    cloud.normals = o3d.utility.Vector3dVector(normals)
+    return cloud.voxel_down_sample(voxel_m)
+
+
+class Fpfh:
+    """FPFH features (Rusu et al. 2009), RANSAC over their correspondences."""
+
+    def __init__(self, config, seed):
+        self.config = config
+        o3d.utility.random.seed(seed)
+
+    def prepare(self, cloud):
+        """Return what `poses` needs of one cloud."""
+        radius = self.config.feature_radius * self.config.voxel_m
+        return cloud, o3d.pipelines.registration.compute_fpfh_feature(
+            cloud, o3d.geometry.KDTreeSearchParamHybrid(radius, 100))
+
+    def poses(self, model, scene):
+        """Return candidate T_world_model, best first."""
+        registration = o3d.pipelines.registration
+        reach = 1.5 * self.config.voxel_m
+        found = registration.registration_ransac_based_on_feature_matching(
+            model[0], scene[0], model[1], scene[1], True, reach,
+            registration.TransformationEstimationPointToPoint(False), 3,
+            [registration.CorrespondenceCheckerBasedOnEdgeLength(0.8),
+             registration.CorrespondenceCheckerBasedOnDistance(reach)],
+            registration.RANSACConvergenceCriteria(self.config.iterations, 0.999))
+        return [found.transformation] if len(found.correspondence_set) else []
+
+
+class Ppf:
+    """Point pair features (Drost et al. 2010) as in OpenCV's surface_matching."""
+
+    def __init__(self, config, seed):
+        import cv2
+        if not hasattr(cv2, 'ppf_match_3d_PPF3DDetector'):
+            raise HoocError('the baseline ppf needs OpenCV with its surface_matching module; '
+                            'install opencv-contrib-python-headless instead of '
+                            'opencv-python-headless')
+        self.cv2, self.config = cv2, config
+
+    def prepare(self, cloud):
+        """Return (cloud, (n, 6) float32 points and normals); the vote wants fewer points."""
+        thin = cloud.voxel_down_sample(2 * self.config.voxel_m)
+        thin.normalize_normals()
+        return cloud, np.ascontiguousarray(
+            np.hstack([np.asarray(thin.points), np.asarray(thin.normals)]), np.float32)
+
+    def poses(self, model, scene):
+        """Return candidate T_world_model, best first."""
+        detector = self.cv2.ppf_match_3d_PPF3DDetector(0.05, 0.05)
+        detector.trainModel(model[1])
+        return [np.array(found.pose) for found in detector.match(scene[1], 1 / 5, 0.05)[:5]]
+
+
+METHODS = {'fpfh': Fpfh, 'ppf': Ppf}
+
+
+def run_baseline(name, scene_set, models, path, seed=0, config=BaselineConfig()):
+    """
+    Write a baseline's results file for all scenes of a set.
+
+    :param name: 'fpfh' or 'ppf'.
+    :param models: {category: GenericModel}; shape and extents are enough.
+    :param path: results file to write.
+    """
+    method = METHODS[name](config, seed)
+    rng = stage_rng(seed, 'baseline')
+    prepared = {category: method.prepare(model_cloud(model, config.voxel_m, rng))
+                for category, model in models.items()}
+    limit = scene_set.max_instances or 1
+    entries = []
+    for scene in tqdm(scene_set.scenes, desc=name, unit='scene', disable=None):
+        views = scene.depth()
+        start = time.perf_counter()
+        found = find(method, [rectify(view) for view in views], prepared, limit, config)
+        entries.append({'scene': scene.name, 'seconds': time.perf_counter() - start,
+                        'energy': None, 'objects': [
+                            _entry(category, T, fit, models[category])
+                            for category, T, fit in found], **scene.world})
+    write_results(path, scene_set.name, entries, profile=f'baseline {name}', seed=seed)
+
+
+def find(method, views, prepared, limit, config):
+    """
+    Return [(category, T_world_model, share of explained model points)], the best fit first.
+
+    :param prepared: {category: what `method.prepare` made of its model}.
+    :param limit: instances of a category at most.
+    """
+    cloud = fused_cloud(views, config.voxel_m)
+    if len(cloud.points) < 10:
+        return []
+    scene, tree = method.prepare(cloud), cKDTree(np.asarray(cloud.points))
+    fits = []
+    for category, model in prepared.items():
+        for T in method.poses(model, scene):
+            T = o3d.pipelines.registration.registration_icp(
+                model[0], cloud, config.inlier_m, T,
+                o3d.pipelines.registration.TransformationEstimationPointToPlane()).transformation
+            points = np.asarray(model[0].points) @ T[:3, :3].T + T[:3, 3]
+            explained = tree.query(points, distance_upper_bound=config.inlier_m)[0] < np.inf
+            if explained.mean() >= config.min_fit and np.isfinite(T).all():
+                taken = np.unique(np.concatenate([
+                    [], *tree.query_ball_point(points, config.inlier_m)]).astype(int))
+                fits.append((float(explained.mean()), category, T, taken))
+    free, out = np.ones(len(cloud.points), bool), []
+    # Large explained pieces first: a small model fits anywhere.
+    for fit, category, T, taken in sorted(fits, key=lambda f: -f[0] * len(f[3])):
+        if free[taken].mean() < config.min_fresh:
+            continue
+        if sum(c == category for c, _, _ in out) < limit:
+            out.append((category, T, fit))
+            free[taken] = False
+    return out
+
+
+def _entry(category, T_world_model, fit, model):
+    """Return the results entry of one found model."""
+    translation, rotation = pose_from_matrix(T_world_model)
+    return {'category': category, 'score': fit, 'translation': translation.tolist(),
+            'rotation_xyzw': rotation.tolist(), 'size': model.extents.tolist()}

@@ -43,13 +43,20 @@ def run(args):
             parameters[name]['cameras'] = tuple(poses)
         parameters['ingestion_node'].update(
             {f'extrinsics.{name}': pose for name, pose in poses.items()})
-    with Supervisor(CHAIN, parameters, args.namespace, verbose=not args.quiet,
-                    params_file=args.params) as supervisor:
-        supervisor.bring_up()
-        print(f'the nodes are up; objects come on {args.namespace.rstrip("/")}/objects/poses; '
-              'end with Ctrl-C', flush=True)
-        while True:
-            supervisor.spin(0.5)
+    up = False
+    try:
+        with Supervisor(CHAIN, parameters, args.namespace, verbose=not args.quiet,
+                        params_file=args.params) as supervisor:
+            supervisor.bring_up()
+            up = True
+            print(f'the nodes are up; objects come on {args.namespace.rstrip("/")}/objects/poses; '
+                  'end with Ctrl-C', flush=True)
+            while True:
+                supervisor.spin(0.5)
+    except KeyboardInterrupt:
+        # The way to end this command; an interrupt before it was up is one.
+        if not up:
+            raise
 
 
 def camera_poses(path):

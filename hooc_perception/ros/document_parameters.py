@@ -61,7 +61,11 @@ def _value(value):
         return '`[' + ', '.join(map(str, value)) + ']`'
     if isinstance(value, str):
         return f'`{value}`' if value else 'empty'
-    return str(value).lower() if isinstance(value, bool) else f'{value:g}'
+    return str(value).lower() if isinstance(value, bool) else _number(value)
+
+
+def _number(value):
+    return str(value) if isinstance(value, int) else f'{value:g}'
 
 
 def _range(m):
@@ -69,7 +73,7 @@ def _range(m):
         return ', '.join(f'`{choice}`' if choice else 'empty' for choice in m['choices'])
     if m['low'] is None and m['high'] is None:
         return ''
-    low, high = ('' if bound is None else f'{bound:g}' for bound in (m['low'], m['high']))
+    low, high = ('' if bound is None else _number(bound) for bound in (m['low'], m['high']))
     return f'{low} .. {high} {m["unit"]}'.strip()
 
 

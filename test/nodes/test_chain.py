@@ -1,0 +1,299 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The four nodes of the chain with stages that only look at what they are given.
+
+What arrives in a stage after all the topics is what the one-process chain would have given it,
+to the last bit; and what the last stage answers comes out as promised.
+"""
+
+import json
+
+from hooc_perception.core.observe import observe, rectify
+from hooc_perception.core.types import DepthView, Energy, ParsedScene
+from hooc_perception.errors import HoocError
+from hooc_perception.models.derive import derive
+from hooc_perception.models.folder import save_model_folder
+import numpy as np
+import pytest
+import trimesh
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseArray, TransformStamped  # noqa: E402
+from hooc_perception.core.geometry import pose_from_matrix, stage_rng  # noqa: E402
+from hooc_perception.nodes import (  # noqa: E402
+    candidate_node,
+    classification_node,
+    ingestion_node,
+    parsing_node,
+)
+from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera  # noqa: E402
+from hooc_perception.ros import conversions as c  # noqa: E402
+from hooc_perception.ros.point_clouds import cloud_rows  # noqa: E402
+from hooc_perception.ros.qos import qos  # noqa: E402
+from hooc_perception.ros.stage_messages import candidates_from_messages  # noqa: E402
+from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+from std_srvs.srv import SetBool, Trigger  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+NODES = (ingestion_node.IngestionNode, classification_node.ClassificationNode,
+         candidate_node.CandidateNode, parsing_node.ParsingNode)
+SEED = 5
+
+
+class Stages:
+    """Stages that note their input and answer from it, so that one wrong bit spreads."""
+
+    def __init__(self, scene):
+        self.views, self.p, self.candidates, self.models = scene
+        self.given, self.chosen, self.refuse = {}, [0, 2], None
+
+    def classify(self, observation, classifier, config):
+        self.given['classify'] = observation, classifier
+        return self.p
+
+    def propose(self, observation, probabilities, models, config, rng):
+        self.given['propose'] = observation, probabilities, models, rng.random()
+        pool = self.candidates
+        return type(pool)(pool.category, pool.translation * 1.0000001, pool.rotation_xyzw,
+                          pool.size, pool.score)
+
+    def parse(self, observation, probabilities, pool, models, config, rng, max_instances=0):
+        self.given['parse'] = observation, probabilities, pool, rng.random(), max_instances
+        if self.refuse:
+            raise HoocError(self.refuse)
+        n = len(self.chosen)
+        return ParsedScene(pool.take(self.chosen), Energy(0.5, 0.25, 0.125),
+                           np.full(n, 0.9, np.float32), np.full(n, 0.01, np.float32),
+                           np.full(n, 3.0, np.float32), np.full(n, 2, np.uint8), pool)
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    """Return a MODEL folder of three simple things, seen by one small camera."""
+    rng = np.random.default_rng(0)
+    meshes = {'box': trimesh.creation.box((0.1, 0.06, 0.08)),
+              'ball': trimesh.creation.icosphere(2, 0.05),
+              'can': trimesh.creation.cylinder(0.04, 0.12)}
+    models = [derive(name, mesh, rng, 200, 100) for name, mesh in meshes.items()]
+    return save_model_folder(tmp_path_factory.mktemp('model') / 'm', 'm', models,
+                             {'kind': np.zeros(1)}, 'fast', 3, (overhead_camera(),), 1)
+
+
+@pytest.fixture
+def chain(bench, folder, monkeypatch):
+    """Return (stages, bench with the active chain, function that sends one frame set)."""
+    stages = Stages(made_up_scene(folder.models, folder.cameras))
+    monkeypatch.setattr(classification_node, 'classify', stages.classify)
+    monkeypatch.setattr(candidate_node, 'propose', stages.propose)
+    monkeypatch.setattr(parsing_node, 'parse', stages.parse)
+    bench.chain = [bench.add(kind, model=str(folder.path), seed=SEED, warm_up=False)
+                   for kind in NODES]
+    camera = overhead_camera()
+    peer = bench.peer
+    images = peer.create_publisher(Image, 'overhead/depth/image_raw',
+                                   qos('<camera>/depth/image_raw'))
+    infos = peer.create_publisher(CameraInfo, 'overhead/depth/camera_info',
+                                  qos('<camera>/depth/camera_info'))
+    poses = peer.create_publisher(TransformStamped, 'overhead/extrinsics',
+                                  qos('<camera>/extrinsics'))
+    for node in bench.chain:
+        assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS, bench.reasons(node)
+        assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    poses.publish(c.transform_message(*pose_from_matrix(camera.T_world_camera),
+                                      c.header(0, 'table'), 'overhead_optical'))
+    depth_topic = '/hooc/views/overhead/depth_rect'
+    assert bench.spin(lambda: images.get_subscription_count() and infos.get_subscription_count()
+                      and peer.count_subscribers(depth_topic) == 3)
+    bench.rest(0.3)
+
+    def send():
+        stamp = peer.get_clock().now().nanoseconds
+        head = c.header(stamp, 'overhead_optical')
+        infos.publish(c.camera_info_message(camera, head))
+        images.publish(c.depth_message(stages.views[0].depth, head))
+        return stamp
+    return stages, bench, send
+
+
+def heard_answer(bench, stages):
+    """Return lists of the messages on the answer's topics, from now on."""
+    kinds = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
+             'objects/labels': String, 'objects/markers': MarkerArray, 'scene/summary': String,
+             'scene/unexplained': PointCloud2, 'objects/can/poses': PoseArray,
+             'objects/ball/poses': PoseArray}
+    return {topic: bench.hear(kind, topic, qos(topic if topic.count('/') == 1
+                                               else 'objects/<category>/poses'))
+            for topic, kind in kinds.items()}
+
+
+def same_bits(a, b):
+    """Compare arrays, records and tuples of them to the last bit."""
+    if isinstance(a, (tuple, list)):
+        assert len(a) == len(b)
+        for x, y in zip(a, b):
+            same_bits(x, y)
+    elif hasattr(a, '__dataclass_fields__'):
+        for name in a.__dataclass_fields__:
+            same_bits(getattr(a, name), getattr(b, name))
+    elif isinstance(a, np.ndarray):
+        assert a.dtype == b.dtype and a.shape == b.shape and a.tobytes() == b.tobytes()
+    else:
+        assert a == b
+
+
+def test_stages_get_what_the_one_process_chain_gives_them(chain, folder):
+    stages, bench, send = chain
+    send()
+    assert bench.spin(lambda: 'parse' in stages.given)
+    view = DepthView(overhead_camera(), stages.views[0].depth)
+    expected = observe([rectify(view)])
+    for stage in ('classify', 'propose', 'parse'):
+        same_bits(stages.given[stage][0], expected)
+    same_bits(stages.given['propose'][1], stages.p)
+    same_bits(stages.given['parse'][1], stages.p)
+    pool = stages.propose(expected, stages.p, folder.models, None, stage_rng(SEED, 'propose'))
+    same_bits(stages.given['parse'][2], pool)
+    assert stages.given['propose'][3] == stage_rng(SEED, 'propose').random()
+    assert stages.given['parse'][3:] == (stage_rng(SEED, 'parse').random(), 1)
+
+
+def test_the_answer_on_its_topics(chain, folder):
+    stages, bench, send = chain
+    heard = heard_answer(bench, stages)
+    stamp = send()
+    assert bench.spin(lambda: all(heard.values()))
+    poses, attributes = heard['objects/poses'][-1], heard['objects/attributes'][-1]
+    assert c.nanoseconds(poses.header.stamp) == stamp and poses.header.frame_id == 'table'
+    same_bits(candidates_from_messages(poses, attributes),
+              stages.given['parse'][2].take(stages.chosen))
+    labels = json.loads(heard['objects/labels'][-1].data)
+    assert [labels['classes'][str(i)]['name'] for i in (1, 2, 3)] == ['box', 'ball', 'can']
+    rows = cloud_rows(attributes)
+    assert [labels['objects'][str(i)]['category'] for i in rows['id']] == ['box', 'can']
+    assert 0 < rows['age_s'][0] < 60
+    assert len(heard['objects/can/poses'][-1].poses) == 1
+    assert len(heard['objects/ball/poses'][-1].poses) == 0
+    summary = json.loads(heard['scene/summary'][-1].data)
+    assert summary['stamp_ns'] == stamp and summary['energy']['total'] == 0.875
+    # The ball was left out, so its surface is what remains unexplained.
+    left = cloud_rows(heard['scene/unexplained'][-1])
+    ball = stages.candidates.translation[1]
+    away = np.hypot(left['x'] - ball[0], left['y'] - ball[1])
+    assert len(left) > 20 and np.median(away) < 0.05
+    markers = heard['objects/markers'][-1].markers
+    assert [(m.ns, m.action) for m in markers] == [('box', Marker.ADD), ('can', Marker.ADD)]
+    assert markers[0].mesh_resource == folder.mesh_path('box').as_uri()
+    assert markers[0].scale.x == pytest.approx(1.0, abs=1e-6)
+
+
+def test_empty_tables_are_answers_and_markers_go(chain):
+    stages, bench, send = chain
+    heard = heard_answer(bench, stages)
+    send()
+    assert bench.spin(lambda: all(heard.values()))
+    first = {(m.ns, m.id) for m in heard['objects/markers'][-1].markers}
+    stages.chosen = []
+    send()
+    assert bench.spin(lambda: all(len(m) >= 2 for m in heard.values()))
+    assert heard['objects/poses'][-1].poses == [] and heard['objects/attributes'][-1].width == 0
+    gone = heard['objects/markers'][-1].markers
+    assert {(m.ns, m.id) for m in gone} == first
+    assert all(m.action == Marker.DELETE for m in gone)
+    assert heard['objects/can/poses'][-1].poses == []
+
+
+def test_ids_are_never_used_twice(chain):
+    stages, bench, send = chain
+    heard = heard_answer(bench, stages)
+    for i in range(3):
+        send()
+        assert bench.spin(lambda: len(heard['objects/attributes']) == i + 1)
+    ids = np.concatenate([cloud_rows(m)['id'] for m in heard['objects/attributes']])
+    assert len(set(ids.tolist())) == 6
+
+
+def call(bench, kind, name, **fields):
+    """Return the future of a service call."""
+    client = bench.peer.create_client(kind, name)
+    assert bench.spin(client.service_is_ready)
+    return client.call_async(kind.Request(**fields))
+
+
+def test_detect_answers_with_what_came_after_the_call(chain):
+    stages, bench, send = chain
+    heard = heard_answer(bench, stages)
+    send()
+    assert bench.spin(lambda: heard['objects/poses'])
+    future = call(bench, Trigger, 'detect')
+    bench.rest(0.5)
+    assert not future.done(), 'answered with what was seen before the call'
+    stamp = send()
+    assert bench.spin(future.done)
+    assert future.result().success
+    answer = json.loads(future.result().message)
+    assert answer['stamp_ns'] == stamp and answer['frame'] == 'table'
+    assert [o['category'] for o in answer['objects']] == ['box', 'can']
+    assert answer['objects'][0]['translation'] == (
+        stages.given['parse'][2].translation[0].tolist())
+
+
+def test_detect_gives_up(chain):
+    stages, bench, send = chain
+    from rclpy.parameter import Parameter
+    assert bench.chain[3].set_parameters(
+        [Parameter('detect_timeout_s', value=0.3)])[0].successful
+    future = call(bench, Trigger, 'detect')
+    assert bench.spin(future.done)
+    assert not future.result().success and 'cameras' in future.result().message
+
+
+def test_enable_and_reset(chain):
+    stages, bench, send = chain
+    heard = heard_answer(bench, stages)
+    future = call(bench, SetBool, 'enable', data=False)
+    assert bench.spin(future.done) and future.result().success
+    send()
+    bench.rest(0.6)
+    assert 'propose' in stages.given and 'parse' not in stages.given
+    bench.chain[0].sent = None      # nobody will answer this one
+    assert bench.spin(call(bench, SetBool, 'enable', data=True).done)
+    send()
+    assert bench.spin(lambda: heard['objects/poses'] and heard['objects/markers'])
+    assert bench.spin(call(bench, Trigger, 'reset').done)
+    assert bench.spin(lambda: heard['objects/markers'][-1].markers[0].action == Marker.DELETEALL)
+
+
+def test_a_refusing_stage_says_why_and_the_next_set_is_parsed(chain):
+    stages, bench, send = chain
+    heard = heard_answer(bench, stages)
+    stages.refuse = 'the moon is too bright'
+    send()
+    assert bench.spin(lambda: 'parse' in bench.reasons(bench.chain[3]))
+    assert bench.reasons(bench.chain[3])['parse'] == ('refused', 'the moon is too bright')
+    assert heard['objects/poses'] == []
+    stages.refuse, bench.chain[0].sent = None, None
+    send()
+    assert bench.spin(lambda: heard['objects/poses'])
+
+
+@pytest.mark.parametrize('kind', NODES[1:])
+def test_models_that_cannot_be_read(bench, kind, tmp_path):
+    node = bench.add(kind, model=str(tmp_path))
+    assert node.trigger_configure() == TransitionCallbackReturn.FAILURE
+    assert 'model.json' in bench.reasons(node)['node'][1]
+    assert node.is_unconfigured()
+
+
+def test_profile_and_overrides_give_the_stage_parameters(bench, folder):
+    from hooc_perception.core.profiles import profile
+    for name in ('paper', 'best', 'fast'):
+        node = bench.add(parsing_node.ParsingNode, profile=name, observe__max_depth_m=2.5)
+        assert node.parameters['parse'] == profile(name).parse
+        assert node.parameters['observe'].max_depth_m == 2.5
+    # Without the parameter, the model's own.
+    node = bench.add(parsing_node.ParsingNode, model=str(folder.path))
+    assert node.parameters['parse'] == profile('fast').parse

@@ -11,7 +11,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 
 VENV=.venv
 STAMP=$VENV/.hooc_setup
-# open3d: libusb, libGL, libEGL, libgomp. pyrender: libEGL with Mesa's software renderer.
+# open3d: libusb, libGL, libEGL, libgomp. pyrender: libEGL with Mesa, and libXrender for pyglet.
 LIBRARIES=(libusb-1.0-0 libgl1 libegl1 libgl1-mesa-dri libgomp1)
 
 say() { printf 'setup: %s\n' "$*" >&2; }
@@ -107,7 +107,7 @@ rm -f "$STAMP"
 export PIP_DISABLE_PIP_VERSION_CHECK=1
 say 'installing the pinned Python packages (about 1 GB on disk; a few minutes on a slow line)'
 # The list is complete, so nothing needs resolving.
-"$VENV/bin/python" -m pip install -q --no-deps -r requirements.txt
+"$VENV/bin/python" -m pip install -q --no-deps --use-pep517 -r requirements.txt
 "$VENV/bin/python" -m pip install -q --no-deps --no-build-isolation --editable .
 
 SITE=$("$VENV/bin/python" -c 'import sysconfig; print(sysconfig.get_path("purelib"))')

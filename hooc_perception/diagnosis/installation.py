@@ -32,7 +32,7 @@ PACKAGES = {
 }
 # Shared library -> the Debian and Ubuntu package that holds it.
 LIBRARIES = {'libusb-1.0.so.0': 'libusb-1.0-0', 'libGL.so.1': 'libgl1', 'libEGL.so.1': 'libegl1',
-             'libgomp.so.1': 'libgomp1'}
+             'libgomp.so.1': 'libgomp1', 'libXrender.so.1': 'libxrender1'}
 SETUP = 'run "make setup" in the source tree'
 LOW_DISK_GB, LOW_MEMORY_GB = 1.0, 4.0
 

@@ -12,7 +12,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 VENV=.venv
 STAMP=$VENV/.hooc_setup
 # open3d: libusb, libGL, libEGL, libgomp. pyrender: libEGL with Mesa, and libXrender for pyglet.
-LIBRARIES=(libusb-1.0-0 libgl1 libegl1 libgl1-mesa-dri libgomp1)
+LIBRARIES=(libusb-1.0-0 libgl1 libegl1 libgl1-mesa-dri libgomp1 libxrender1)
 
 say() { printf 'setup: %s\n' "$*" >&2; }
 die() { say "$*"; exit 1; }

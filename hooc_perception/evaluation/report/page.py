@@ -145,13 +145,13 @@ def most_likely(probabilities, view, shape):
 
 def _outlines(ids, objects, palette, font):
     """Return the outlines of all objects in sight, with places for their names that keep apart."""
-    out = []
+    out, colours = [], pictures.instance_colours(objects, palette)
     for k, thing in enumerate(objects):
         shape = pictures.outline(ids == k)
         if shape:
             path, (x, y), _ = shape
             out.append({'k': k, 'path': path, 'x': x, 'y': y, 'name': thing.category,
-                        'colour': pictures.hex_colour(palette[thing.category])})
+                        'colour': pictures.hex_colour(colours[k])})
     placed = []
     for item in sorted(out, key=lambda o: o['y']):
         half = 0.29 * font * len(item['name']) + 1
@@ -171,7 +171,7 @@ def _rows(scene, scores, palette):
     by_estimate = {s.estimate: s for s in scores or () if s.estimate is not None}
     true = {t.category for t in scene.truth or ()}
     drawn = [i for i, o in enumerate(scene.objects) if o.category in scene.models]
-    rows = []
+    colours, rows = pictures.instance_colours(scene.objects, palette), []
     for i, thing in enumerate(scene.objects):
         score = by_estimate.get(i)
         verdict = None
@@ -184,7 +184,7 @@ def _rows(scene, scores, palette):
             'size': [100 * x for x in thing.size], 'verdict': verdict,
             'error_mm': 1000 * score.centre_m if score else None,
             'turn': float(np.degrees(score.rotation_rad)) if score else None,
-            'colour': pictures.hex_colour(palette[thing.category]),
+            'colour': pictures.hex_colour(colours[i]),
             **(scene.evidence[i] if i < len(scene.evidence) else
                dict.fromkeys(('visible_ratio', 'residual_m', 'energy_delta', 'n_views')))})
     return rows
@@ -220,7 +220,7 @@ def _shaded(drawn, meshes, true, true_meshes, scene, palette):
     for title, objects, shapes in (('estimate', drawn, meshes), ('truth', true, true_meshes)):
         if title == 'truth' and scene.truth is None:
             continue
-        rgb = shaded_picture(shapes, [palette[o.category] for o in objects], camera,
+        rgb = shaded_picture(shapes, pictures.instance_colours(objects, palette), camera,
                              meshes + true_meshes)
         out.append({'title': title, 'uri': pictures.data_uri(rgb), 'height': rgb.shape[0],
                     'width': rgb.shape[1]})

@@ -27,6 +27,16 @@ def colours(names):
     return out
 
 
+def instance_colours(objects, palette):
+    """Return one (r, g, b) an object: its category's, lighter or darker for the next ones."""
+    out, count = [], {}
+    for thing in objects:
+        k = count[thing.category] = count.get(thing.category, -1) + 1
+        rgb = np.array(palette[thing.category])
+        out.append(tuple((rgb * (1, 0.7)[k % 2] + 70 * (k % 3 == 2)).clip(0, 255).astype(int)))
+    return out
+
+
 def hex_colour(rgb):
     """Return '#rrggbb'."""
     return '#' + ''.join(f'{int(c):02x}' for c in rgb)

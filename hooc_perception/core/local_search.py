@@ -22,8 +22,9 @@ class LocalSearchConfig(Config):
     """Parameters of the iterated local search."""
 
     patience: int = param(
-        40, 'kicks in a row without a gain after which the search has converged', low=0)
-    kick: int = param(3, 'most random flips of a kick; each kick draws 1 to this many', low=1)
+        30, 'kicks in a row without a gain after which the search has converged; finds the best '
+        'known of long runs on every development scene', low=0)
+    kick: int = param(5, 'most random flips of a kick; each kick draws 1 to this many', low=1)
     swaps: bool = param(True, 'whether a member may be exchanged for an outsider in one step')
 
 
@@ -107,7 +108,8 @@ def local_search(energy, rng, config=LocalSearchConfig(), stop=None):
     Minimise an energy from its current subset; see the module.
 
     Each kick flips a few things at random, half of the time members and half of the time
-    outsiders; the search goes down from there and comes back unless that is no worse.
+    outsiders, and lets the others settle; the search goes down from there and comes back
+    unless that is no worse.
 
     :param stop: callable without arguments that returns True when time is up.
     :return: SearchResult; the energy is left at the best subset.
@@ -138,13 +140,27 @@ def local_search(energy, rng, config=LocalSearchConfig(), stop=None):
 
 
 def _kick(energy, rng, most):
-    """Flip one to `most` random things, members or outsiders with equal chance."""
+    """
+    Flip one to `most` random things, members or outsiders with equal chance.
+
+    The others then settle by best flips while the kicked ones are held: a new member would
+    otherwise be the first to go, before those that it makes superfluous have gone.
+    """
+    held = np.zeros(energy.n, bool)
     for _ in range(rng.integers(1, most + 1)):
         mask = energy.mask
-        choice = np.flatnonzero(mask if rng.random() < .5 else
-                                ~mask & np.isfinite(energy.deltas()))
+        choice = np.flatnonzero(~held & (mask if rng.random() < .5 else
+                                         ~mask & np.isfinite(energy.deltas())))
         if len(choice):
-            energy.flip(int(rng.choice(choice)))
+            k = int(rng.choice(choice))
+            held[k] = True
+            energy.flip(k)
+    while energy.n:
+        deltas = np.where(held, np.inf, energy.deltas())
+        k = int(np.argmin(deltas))
+        if deltas[k] >= -TINY:
+            return
+        energy.flip(k)
 
 
 def _go_to(energy, mask):

@@ -29,10 +29,10 @@ class ClassifyConfig(Config):
     stride: int = param(2, 'The fused forest reads every n-th pixel in both directions; pixels '
                         'between take the probabilities of neighbours at their depth.', 'px', 1, 8)
     smoothing_steps: int = param(12, 'Steps by which probabilities spread over the surface '
-                                 'graph, over all views; 0 = none. Never used by the paper\'s '
+                                 "graph, over all views; 0 = none. Never used by the paper's "
                                  'forest.', '', 0, 200)
-    smoothing_angle_rad: float = param(0.3, 'A valley of this angle between two surface points '
-                                       'cuts the spread to 1/e.', 'rad', 0.01, 3.0)
+    smoothing_angle_rad: float = param(0.5, 'A valley of about this angle between two surface '
+                                       'points cuts the spread to 1/e.', 'rad', 0.01, 3.0)
 
 
 def classify(observation, classifier, config=ClassifyConfig()):

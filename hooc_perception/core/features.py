@@ -15,15 +15,19 @@ from hooc_perception.core.geometry import inverse
 from hooc_perception.core.kernels import forest_features as features
 from hooc_perception.core.kernels import forest_field as fields
 from hooc_perception.core.kernels import forest_segments as segments
+from hooc_perception.core.kernels.forest_texture import textures
 import numpy as np
 
 FIELD_CELL_M = 0.005
 VOXEL_M = 0.006
 MARGIN_M = 0.10
 MAX_CELLS = 40_000_000
-# Felzenszwalb scales: small parts, convex parts, whole clusters. The middle one orients.
-SEGMENT_SCALES = (1.0, 6.0, 60.0)
+# Felzenszwalb scales, from parts to clusters. ORIENTING names the one that most often is one
+# object: its long axis turns half of the probes.
+SEGMENT_SCALES = (1.2, 3.0, 6.0, 14.0)
+ORIENTING = 1
 SMALLEST_SEGMENT = 12
+TEXTURE_ANGLE_RAD = 0.5
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,8 @@ def foreground_pixels(observation):
         depth = np.ascontiguousarray(view.depth, np.float32)
         normal, residual = fields.normals(depth, rows, cols, K, R, 3, 0.02)
         d = depth[rows, cols].astype(np.float64)
-        local = np.column_stack([(cols - K[0, 2]) / K[0, 0] * d, (rows - K[1, 2]) / K[1, 1] * d, d])
+        local = np.column_stack([(cols - K[0, 2]) / K[0, 0] * d,
+                                 (rows - K[1, 2]) / K[1, 1] * d, d])
         parts.append((np.full(len(rows), index, np.uint8),
                       np.column_stack([cols, rows]).astype(np.uint16),
                       local @ R.T + T[:3, 3], normal, residual))
@@ -96,6 +101,7 @@ class Surroundings:
     voxel_normals: np.ndarray
     pairs: np.ndarray
     weight: np.ndarray
+    texture: np.ndarray
     ids: np.ndarray
     frames: np.ndarray
     shapes: np.ndarray
@@ -122,6 +128,7 @@ def surroundings(observation, pixels):
     voxel, mean, normal, grid = segments.voxelise(
         pixels.points, pixels.normals.astype(np.float64), low, voxel_cell, grid_shape)
     pairs, weight = segments.edges(mean, normal, grid, low, voxel_cell)
+    texture = textures(mean, normal, pairs, np.exp(-(weight / TEXTURE_ANGLE_RAD) ** 2))
     order = np.argsort(weight, kind='stable')
     ids = np.stack([segments.segment(len(mean), pairs, weight, order, k, SMALLEST_SEGMENT)
                     for k in SEGMENT_SCALES])
@@ -132,8 +139,8 @@ def surroundings(observation, pixels):
         n = int(row.max()) + 1
         frames[level, :n], shapes[level, :n] = segments.describe(row, n, mean, normal, voxel_cell)
     top = features.height_map(pixels.points, low, cell, shape[0], shape[1])
-    return Surroundings(low, cell, field, top, voxel, mean, normal, pairs, weight, ids, frames,
-                        shapes)
+    return Surroundings(low, cell, field, top, voxel, mean, normal, pairs, weight, texture, ids,
+                        frames, shapes)
 
 
 def pixel_features(pixels, around, probes, rows):
@@ -146,6 +153,7 @@ def pixel_features(pixels, around, probes, rows):
     out = np.empty((len(rows), feature_count(len(probes))), np.float32)
     features.point_features(
         pixels.points[rows], pixels.normals[rows].astype(np.float64), pixels.residual[rows],
-        around.field, around.origin, around.cell, around.heights, around.voxel[rows], around.ids,
-        around.frames, around.shapes, np.ascontiguousarray(probes), out)
+        around.field, around.origin, around.cell, around.heights, around.voxel[rows],
+        around.texture, around.ids, around.frames, around.shapes, ORIENTING,
+        np.ascontiguousarray(probes), out)
     return out

@@ -22,12 +22,14 @@ class FitConfig(Config):
     """Parameters of forest growth."""
 
     trees: int = param(40, 'Trees of the forest.', '', 1, 1000)
-    features_per_node: int = param(40, 'Features drawn at random at each node.', '', 1, 10000)
+    features_per_node: int = param(100, 'Features drawn at random at each node.', '', 1, 10000)
+    node_samples: int = param(6000, 'Most samples that rank the features of a node; all are '
+                              'then split.', '', 10, 100000000)
     max_depth: int = param(26, 'Deepest split.', '', 1, 60)
-    min_leaf: int = param(6, 'Fewest training samples in a leaf.', '', 1, 10000)
+    min_leaf: int = param(12, 'Fewest training samples in a leaf.', '', 1, 10000)
     min_gain_bits: float = param(0.005, 'Least information gain of a split.', 'bit', 0.0, 1.0)
     bins: int = param(64, 'Quantisation levels of a feature.', '', 2, 255)
-    prior: float = param(0.3, 'Share of a leaf\'s mass, in samples, that is spread as in the '
+    prior: float = param(0.3, "Share of a leaf's mass, in samples, that is spread as in the "
                          'whole training set, so that no class is ever impossible.', '', 0.0, 100)
     sample_share: float = param(0.6, 'Share of the samples, without replacement, that grows a '
                                 'tree; all of them fill its leaves.', '', 0.01, 1.0)
@@ -74,7 +76,7 @@ def fit(binned, y, n_classes, cuts, config, rng, n_jobs=1, progress=None):
         order = np.random.default_rng(order_seed).permutation(n)[:m].astype(np.int32)
         feature, split, left = fit_kernels.grow_tree(
             binned, y, np.sort(order), n_classes, config.bins, config.features_per_node,
-            config.max_depth, config.min_leaf, config.min_gain_bits, int(node_seed))
+            config.node_samples, config.max_depth, config.min_leaf, config.min_gain_bits, int(node_seed))
         end = fit_kernels.walk_binned(binned, feature, split, left)
         threshold = np.zeros(len(feature), np.float32)
         inner = feature >= 0

@@ -6,6 +6,9 @@ from hooc_perception.core.kernels.forest_pixels import respond
 import numba as nb
 import numpy as np
 
+# Below this many samples a pass over all cells of the histogram costs more than a sort.
+SMALL_NODE = 500
+
 
 @nb.njit(cache=True, nogil=True)
 def x_log_x(n):
@@ -14,6 +17,48 @@ def x_log_x(n):
     for k in range(2, n + 1):
         out[k] = k * np.log2(k)
     return out
+
+
+@nb.njit(cache=True, nogil=True)
+def _best_split_small(values, y, node_counts, n_bins, table, min_leaf):
+    """Return `best_split` of a small node, by moving samples over one at a time."""
+    n, n_classes = values.shape[0], node_counts.shape[0]
+    start = np.zeros(n_bins + 1, np.int32)
+    for i in range(n):
+        start[values[i] + 1] += 1
+    for b in range(n_bins):
+        start[b + 1] += start[b]
+    fill = start.copy()
+    ordered = np.empty(n, np.uint8)
+    for i in range(n):
+        ordered[fill[values[i]]] = y[i]
+        fill[values[i]] += 1
+    parent, inside_right = table[n], 0.0
+    for c in range(n_classes):
+        parent -= table[node_counts[c]]
+        inside_right += table[node_counts[c]]
+    left = np.zeros(n_classes, np.int64)
+    inside_left = 0.0
+    best, best_bin = -1.0, -1
+    for b in range(n_bins - 1):
+        if start[b + 1] == start[b]:
+            continue
+        for i in range(start[b], start[b + 1]):
+            c = ordered[i]
+            k = left[c]
+            inside_left += table[k + 1] - table[k]
+            inside_right += table[node_counts[c] - k - 1] - table[node_counts[c] - k]
+            left[c] = k + 1
+        n_left = start[b + 1]
+        n_right = n - n_left
+        if n_right < min_leaf:
+            break
+        if n_left < min_leaf:
+            continue
+        gain = parent - (table[n_left] - inside_left) - (table[n_right] - inside_right)
+        if gain > best:
+            best, best_bin = gain, b
+    return best, best_bin
 
 
 @nb.njit(cache=True, nogil=True)
@@ -28,6 +73,8 @@ def best_split(values, y, node_counts, n_bins, table, min_leaf, histogram, bin_s
     :return: gain in bits times n, -1.0 where no split leaves `min_leaf` samples each side.
     """
     n, n_classes = values.shape[0], node_counts.shape[0]
+    if n < SMALL_NODE:
+        return _best_split_small(values, y, node_counts, n_bins, table, min_leaf)
     histogram[:] = 0
     bin_sizes[:] = 0
     for i in range(n):
@@ -63,13 +110,23 @@ def best_split(values, y, node_counts, n_bins, table, min_leaf, histogram, bin_s
 
 
 @nb.njit(cache=True, nogil=True)
-def grow_tree(binned, y, samples, n_classes, n_bins, n_try, max_depth, min_leaf, min_gain, seed):
+def _shuffle_first(samples, lo, hi, k):
+    """Bring a random subset of samples[lo:hi] to its first k places."""
+    for i in range(k):
+        j = i + np.random.randint(0, hi - lo - i)
+        samples[lo + i], samples[lo + j] = samples[lo + j], samples[lo + i]
+
+
+@nb.njit(cache=True, nogil=True)
+def grow_tree(binned, y, samples, n_classes, n_bins, n_try, node_samples, max_depth, min_leaf,
+              min_gain, seed):
     """
     Return (feature, bin, left) of one tree, nodes in depth-first order; feature -1 = leaf.
 
     :param binned: (F, n) uint8 quantised features; y (n,) uint8.
     :param samples: (m,) int32 columns of `binned` that grow this tree; reordered in place.
     :param n_try: features drawn at each node.
+    :param node_samples: a random subset of this size ranks the features of a larger node.
     :param min_gain: least information gain, bits, of a split.
     """
     np.random.seed(seed)
@@ -90,20 +147,26 @@ def grow_tree(binned, y, samples, n_classes, n_bins, n_try, max_depth, min_leaf,
     while len(stack):
         node, lo, hi, depth = stack.pop()
         n = hi - lo
+        if depth >= max_depth or n < 2 * min_leaf:
+            continue
+        k = min(n, node_samples)
+        if k < n:
+            _shuffle_first(samples, lo, hi, k)
         counts = np.zeros(n_classes, np.int64)
-        for i in range(n):
+        for i in range(k):
             classes[i] = y[samples[lo + i]]
             counts[classes[i]] += 1
-        if depth >= max_depth or n < 2 * min_leaf or counts.max() == n:
+        if counts.max() == k:
             continue
-        best, best_feature, best_bin = min_gain * n, -1, -1
+        least = max(1, min_leaf * k // n)
+        best, best_feature, best_bin = min_gain * k, -1, -1
         for t in range(min(n_try, n_features)):
             j = t + np.random.randint(0, n_features - t)
             pool[t], pool[j] = pool[j], pool[t]
             row = binned[pool[t]]
-            for i in range(n):
+            for i in range(k):
                 values[i] = row[samples[lo + i]]
-            gain, b = best_split(values[:n], classes[:n], counts, n_bins, table, min_leaf,
+            gain, b = best_split(values[:k], classes[:k], counts, n_bins, table, least,
                                  histogram, bin_sizes)
             if gain > best:
                 best, best_feature, best_bin = gain, pool[t], b
@@ -121,6 +184,8 @@ def grow_tree(binned, y, samples, n_classes, n_bins, n_try, max_depth, min_leaf,
                 b += 1
         for i in range(b):
             samples[a + i] = buffer[i]
+        if used + 2 > capacity:
+            continue
         feature[node], split[node], left[node] = best_feature, best_bin, used
         stack.append((used + 1, a, hi, depth + 1))
         stack.append((used, lo, a, depth + 1))
@@ -193,9 +258,7 @@ def grow_pixel_tree(images, scene, centre, y, samples, n_classes, n_tests, n_thr
         # A random subset of a large node suffices to rank tests; its cost is bounded.
         k = min(n, node_samples)
         if k < n:
-            for i in range(k):
-                j = i + np.random.randint(0, n - i)
-                samples[lo + i], samples[lo + j] = samples[lo + j], samples[lo + i]
+            _shuffle_first(samples, lo, hi, k)
         counts = np.zeros(n_classes, np.int64)
         for i in range(k):
             classes[i] = y[samples[lo + i]]

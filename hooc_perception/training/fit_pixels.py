@@ -34,7 +34,7 @@ class PixelFitConfig(Config):
     table_share: float = param(0.1, 'Pixels of the empty table added to these, as a share: the '
                                'background class must know what it looks like (open).', '',
                                0.0, 2.0)
-    region_m: float = param(0.12, 'Half the side of a bounding region at the point\'s depth '
+    region_m: float = param(0.12, "Half the side of a bounding region at the point's depth "
                             '(open): most objects, seen from their middle, fit in.', 'm',
                             0.01, 1.0)
     centre_share: float = param(0.5, 'Share of tests against the centre instead of a second '

@@ -79,7 +79,7 @@ def train(scene_set, out, profile='best', seed=0, progress=True, configs=None, j
     if not scene_set.categories:
         raise HoocError(f'{scene_set.path} lists no categories; name at least one in dataset.yaml')
     if not scene_set.cameras:
-        raise HoocError(f'{scene_set.path} names no cameras; training needs the cameras\' layout')
+        raise HoocError(f"{scene_set.path} names no cameras; training needs the cameras' layout")
     models = generic_models(scene_set, seed, progress)
     classifier = train_classifier(models, scene_set.cameras, profile, seed,
                                   scene_set.max_instances, configs, jobs, progress)

@@ -3,6 +3,7 @@
 """Rig-independent features of foreground points, read from the fused field."""
 
 from hooc_perception.core.kernels.forest_field import march, probe
+from hooc_perception.core.kernels.forest_texture import TEXTURE_FEATURES
 import numba as nb
 import numpy as np
 
@@ -15,7 +16,7 @@ BASIC = 3
 MARCHES = 24
 HEIGHT_RINGS = 4 * len(RADII_M)
 FIELD_RINGS = 2 * len(RADII_M) * len(RISES_M)
-FIXED_FEATURES = BASIC + MARCHES + HEIGHT_RINGS + FIELD_RINGS
+FIXED_FEATURES = BASIC + MARCHES + HEIGHT_RINGS + FIELD_RINGS + TEXTURE_FEATURES
 
 
 @nb.njit(cache=True)
@@ -107,23 +108,24 @@ def _field_rings(field, origin, cell, p, out):
 
 
 @nb.njit(cache=True, parallel=True)
-def point_features(points, normal, residual, field, origin, cell, heights, voxel, ids, frames,
-                   shapes, probes, out):
+def point_features(points, normal, residual, field, origin, cell, heights, voxel, texture, ids,
+                   frames, shapes, orienting, probes, out):
     """
     Fill the feature rows of query points.
 
     :param points: (n, 3) world; normal (n, 3), residual (n,) of the local plane fit.
     :param voxel: (n,) index into the rows of `ids`.
+    :param texture: (m, TEXTURE_FEATURES) float32 of voxels.
     :param ids: (levels, m) int32 segment of each voxel at each level.
     :param frames: (levels, S, 5) and shapes (levels, S, SEGMENT_FEATURES) from `describe`.
+    :param orienting: level whose segments give the second frame.
     :param probes: (P, 5) float64: frame (0 normal's yaw, 1 segment's axis), 1 where the last
         coordinate is a height above the table, and the offset (3,) in metres.
     :param out: (n, FIXED_FEATURES + P + levels * (SEGMENT_FEATURES + 4)) float32.
     """
-    middle = ids.shape[0] // 2
     for i in nb.prange(points.shape[0]):
         p, n, f = points[i], normal[i], out[i]
-        own = frames[middle, ids[middle, voxel[i]]]
+        own = frames[orienting, ids[orienting, voxel[i]]]
         sx, sy = own[2], own[3]
         cy, syaw = n[0], n[1]
         length = np.sqrt(cy * cy + syaw * syaw)
@@ -138,6 +140,9 @@ def point_features(points, normal, residual, field, origin, cell, heights, voxel
         o += HEIGHT_RINGS
         _field_rings(field, origin, cell, p, f[o:])
         o += FIELD_RINGS
+        for k in range(TEXTURE_FEATURES):
+            f[o + k] = texture[voxel[i], k]
+        o += TEXTURE_FEATURES
         for k in range(probes.shape[0]):
             c, s = cy, syaw
             if probes[k, 0] > 0:

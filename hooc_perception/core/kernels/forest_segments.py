@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Voxel graph of the foreground, its convex segments, and their shape measures."""
 
+from hooc_perception.core.kernels.forest_texture import normal_shape
 import numba as nb
 import numpy as np
 
-SEGMENT_FEATURES = 36
+SEGMENT_FEATURES = 40
 SLICES = 6
 
 
@@ -51,11 +52,16 @@ def edges(mean, normal, grid, origin, cell):
     Return (pairs (e, 2) int32, weight (e,) float32) of voxels that touch (5^3 neighbours).
 
     The weight is the concave angle between the two surfaces (radians, 0 for a convex or flat
-    joint; cf. LCCP, Stein et al. 2014), plus a small share of the angle between the normals
-    so that smooth joints close first.
+    joint; cf. LCCP, Stein et al. 2014), half of it averaged over all joints of both voxels
+    because single normals are noisy; plus shares of the angle between the normals and of the
+    distance, so that smooth and close joints close first. The shares maximised the overlap
+    of segments with objects.
     """
     pairs = np.empty((mean.shape[0] * 40, 2), np.int32)
     weight = np.empty(mean.shape[0] * 40, np.float32)
+    valley = np.empty(mean.shape[0] * 40, np.float32)
+    total = np.zeros(mean.shape[0], np.float32)
+    degree = np.zeros(mean.shape[0], np.float32)
     e = 0
     nx, ny, nz = grid.shape
     for v in range(mean.shape[0]):
@@ -84,8 +90,16 @@ def edges(mean, normal, grid, origin, cell):
                     if dot < -0.5:
                         concave = 0.0
                     pairs[e, 0], pairs[e, 1] = v, w
-                    weight[e] = concave + 0.1 * bend + 0.02 * d / cell
+                    valley[e] = concave
+                    weight[e] = 0.05 * bend + 0.2 * d / cell
+                    total[v] += concave
+                    total[w] += concave
+                    degree[v] += 1
+                    degree[w] += 1
                     e += 1
+    for i in range(e):
+        v, w = pairs[i, 0], pairs[i, 1]
+        weight[i] += 0.5 * valley[i] + 0.25 * (total[v] / degree[v] + total[w] / degree[w])
     return pairs[:e], weight[:e]
 
 
@@ -169,7 +183,8 @@ def describe(ids, n_segments, mean, normal, cell):
         f = out[s]
         x, y, z = mean[m, 0], mean[m, 1], mean[m, 2]
         mx, my = np.mean(x), np.mean(y)
-        sxx, sxy, syy = np.mean((x - mx) ** 2), np.mean((x - mx) * (y - my)), np.mean((y - my) ** 2)
+        sxx, syy = np.mean((x - mx) ** 2), np.mean((y - my) ** 2)
+        sxy = np.mean((x - mx) * (y - my))
         angle = 0.5 * np.arctan2(2 * sxy, sxx - syy)
         ax, ay = np.cos(angle), np.sin(angle)
         t, q = (x - mx) * ax + (y - my) * ay, -(x - mx) * ay + (y - my) * ax
@@ -231,6 +246,16 @@ def describe(ids, n_segments, mean, normal, cell):
         f[15] = n * cell * cell / (length * breadth)
         f[16] = mz - z0
         f[17] = z1
+        moment = np.zeros(6)
+        for i in m:
+            a, b, c = normal[i, 0], normal[i, 1], normal[i, 2]
+            moment[0] += a * a / n
+            moment[1] += a * b / n
+            moment[2] += a * c / n
+            moment[3] += b * b / n
+            moment[4] += b * c / n
+            moment[5] += c * c / n
+        normal_shape(moment, f[36:40])
         for b in range(SLICES):
             a = SLICES - 1 - b if flip else b
             if hi[a] >= lo[a]:

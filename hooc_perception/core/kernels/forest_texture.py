@@ -1,0 +1,91 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Bend of the surface around each voxel, at two reaches along the surface graph."""
+
+import numba as nb
+import numpy as np
+
+REACHES = (3, 10)
+TEXTURE_FEATURES = 7 * len(REACHES)
+
+
+@nb.njit(cache=True)
+def _diffuse(values, pairs, weight, steps):
+    """Return (m, C) after `steps` of averaging over the weighted graph, own weight 1."""
+    m, n = values.shape
+    now = values.copy()
+    new = np.empty_like(now)
+    total = np.ones(m)
+    for e in range(pairs.shape[0]):
+        total[pairs[e, 0]] += weight[e]
+        total[pairs[e, 1]] += weight[e]
+    for _ in range(steps):
+        new[:] = now
+        for e in range(pairs.shape[0]):
+            a, b, w = pairs[e, 0], pairs[e, 1], weight[e]
+            for c in range(n):
+                new[a, c] += w * now[b, c]
+                new[b, c] += w * now[a, c]
+        for i in range(m):
+            for c in range(n):
+                now[i, c] = new[i, c] / total[i]
+    return now
+
+
+@nb.njit(cache=True)
+def normal_shape(tensor, out):
+    """
+    Fill out (4,): what the second moment of normals (xx xy xz yy yz zz) says of the shape.
+
+    The two smaller eigenvalues (plane 0 0, cylinder 0 1/2, ball 1/3 1/3), and the vertical
+    components of the axis that the normals avoid and of their main direction.
+    """
+    a = np.empty((3, 3))
+    a[0, 0], a[0, 1], a[0, 2], a[1, 1], a[1, 2], a[2, 2] = (
+        tensor[0], tensor[1], tensor[2], tensor[3], tensor[4], tensor[5])
+    a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
+    values, vectors = np.linalg.eigh(a)
+    out[0], out[1] = values[0], values[1]
+    out[2], out[3] = abs(vectors[2, 0]), abs(vectors[2, 2])
+
+
+@nb.njit(cache=True)
+def textures(points, normals, pairs, weight):
+    """
+    Return (m, TEXTURE_FEATURES) float32 of voxels: `normal_shape`, valley, ridge, curvature.
+
+    :param points: (m, 3) and normals (m, 3); pairs (e, 2), weight (e,) in [0, 1].
+    """
+    m = points.shape[0]
+    raw = np.zeros((m, 9), np.float64)
+    degree = np.full(m, 1e-6)
+    for i in range(m):
+        n = normals[i]
+        raw[i, 0], raw[i, 1], raw[i, 2] = n[0] * n[0], n[0] * n[1], n[0] * n[2]
+        raw[i, 3], raw[i, 4], raw[i, 5] = n[1] * n[1], n[1] * n[2], n[2] * n[2]
+    for e in range(pairs.shape[0]):
+        a, b = pairs[e, 0], pairs[e, 1]
+        d, bend = 0.0, 0.0
+        for k in range(3):
+            d += (points[b, k] - points[a, k]) ** 2
+            bend += (normals[b, k] - normals[a, k]) * (points[b, k] - points[a, k])
+        d = np.sqrt(d)
+        bend /= d
+        for i in (a, b):
+            raw[i, 6] += max(0.0, -bend)
+            raw[i, 7] += max(0.0, bend)
+            raw[i, 8] += bend / d
+            degree[i] += 1
+    for i in range(m):
+        for k in range(6, 9):
+            raw[i, k] /= degree[i]
+    out = np.empty((m, TEXTURE_FEATURES), np.float32)
+    now, done = raw, 0
+    for r in range(len(REACHES)):
+        now = _diffuse(now, pairs, weight, REACHES[r] - done)
+        done = REACHES[r]
+        for i in range(m):
+            normal_shape(now[i, :6], out[i, 7 * r:7 * r + 4])
+            for k in range(3):
+                out[i, 7 * r + 4 + k] = now[i, 6 + k]
+    return out

@@ -23,6 +23,8 @@ def add_arguments(parser):
     parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
     parser.add_argument('--report', type=Path, metavar='DIR',
                         help='write a report with pictures to DIR/report.html')
+    parser.add_argument('--record', type=Path, metavar='DIR',
+                        help='record all that goes over the topics as bags DIR/<scene>')
     parser.add_argument('--timeout', type=float, default=300.0, metavar='S',
                         help='how long one scene may take (default: %(default)g s)')
     parser.add_argument('--params', type=Path, metavar='FILE',
@@ -76,7 +78,7 @@ def play(bags, args, profile):
     answers = []
     with Supervisor((*CHAIN, REPLAY), parameters, isolated=True, verbose=args.verbose,
                     params_file=args.params) as supervisor:
-        runner = BagRunner(supervisor, args.timeout)
+        runner = BagRunner(supervisor, args.timeout, getattr(args, 'record', None))
         for bag in tqdm(bags, desc='scenes', unit='scene', disable=None):
             answers.append(runner.play(bag))
     return answers

@@ -40,11 +40,10 @@ class CandidateNode(StageNode):
                                {'probabilities': (PointCloud2, 'pixels/probabilities')},
                                self.on_set)
 
-    def on_set(self, stamp_ns, views, messages):
+    def on_set(self, stamp_ns, observation, messages):
         """Propose candidates for one frame set."""
         start = time.monotonic()
         try:
-            observation = observe(views, self.parameters['observe'])
             candidates = propose(
                 observation, probabilities_from_message(messages['probabilities']), self.models,
                 self.parameters['propose'], stage_rng(self.config.seed, 'propose'))

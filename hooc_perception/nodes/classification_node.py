@@ -38,12 +38,11 @@ class ClassificationNode(StageNode):
                        for name in self.names]
         self.input = ViewInput(self, self.names, {}, self.on_views)
 
-    def on_views(self, stamp_ns, views, messages):
+    def on_views(self, stamp_ns, observation, messages):
         """Classify one frame set."""
         start = time.monotonic()
         head = header(stamp_ns, self.config.target_frame)
         try:
-            observation = observe(views, self.parameters['observe'])
             probabilities = classify(observation, self.classifier, self.parameters['classify'])
             self.probabilities.publish(
                 probabilities_message(probabilities, observation, self.classes, head))
@@ -53,8 +52,7 @@ class ClassificationNode(StageNode):
         seconds = time.monotonic() - start
         images = label_images(probabilities, observation)
         for name, publisher, image in zip(self.names, self.labels, images):
-            frame = messages[f'{name}/depth_rect'].header.frame_id
-            publisher.publish(labels_message(image, header(stamp_ns, frame)))
+            publisher.publish(labels_message(image, header(stamp_ns, messages['frames'][name])))
         self.diagnostics.ok('classify', seconds=seconds, pixels=len(probabilities.camera))
 
 

@@ -72,13 +72,12 @@ class ParsingNode(StageNode):
         """Say what the class ids mean."""
         self.output.announce()
 
-    def on_set(self, stamp_ns, views, messages):
+    def on_set(self, stamp_ns, observation, messages):
         """Parse one frame set."""
         if not self.enabled:
             return
         start = time.monotonic()
         try:
-            observation = observe(views, self.parameters['observe'])
             parsed = parse(
                 observation, probabilities_from_message(messages['probabilities']),
                 candidates_from_messages(messages['poses'], messages['attributes']),
@@ -103,7 +102,7 @@ class ParsingNode(StageNode):
 
     def on_reset(self, request, response):
         """Forget what waits to be joined and take what viewers show away."""
-        self.input.join.clear()
+        self.input.clear()
         self.output.clear()
         response.success, response.message = True, json.dumps({'objects': 0})
         return response

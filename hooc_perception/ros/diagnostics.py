@@ -39,6 +39,10 @@ class Diagnostics:
             self._state[thing] = (OK, 'ok', 'ok', time.monotonic())
         self._values.setdefault(thing, {}).update(values)
 
+    def succeeded(self):
+        """Report that the node itself did what it was asked to."""
+        self._state['node'] = (OK, 'ok', 'ok', time.monotonic())
+
     def count(self, thing, code, number=1):
         """Count what is normal but worth knowing (frames superseded)."""
         self._counts[thing, code] += number

@@ -175,6 +175,7 @@ class StageNode(LifecycleNode):
         """Return whether `step()` went through; log the sentence or the surprise otherwise."""
         try:
             step()
+            self.diagnostics.succeeded()
             return True
         except HoocError as error:
             self.diagnostics.failed(f'{what}_failed', str(error))
@@ -185,7 +186,7 @@ class StageNode(LifecycleNode):
         return False
 
     def _destroy(self):
-        self._attempt('cleanup', self.cleanup)
+        self.cleanup()
         while self._mine:
             destroy, made = self._mine.pop()
             destroy(made)

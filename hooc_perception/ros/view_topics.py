@@ -4,7 +4,9 @@
 
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.core.geometry import back_project, pose_from_matrix
+from hooc_perception.core.observe import observe
 from hooc_perception.core.types import RectifiedView
+from hooc_perception.errors import HoocError
 from hooc_perception.ros.conversions import (
     camera_from_messages,
     camera_info_message,
@@ -62,36 +64,60 @@ def fused_cloud(views, head):
 
 class ViewInput:
     """
-    Receive rectified views and whatever else a stage needs for the same stamp.
+    Receive rectified views, observe them, join whatever else a stage needs of the same stamp.
 
-    :param others: {part: (message type, topic)} that are joined with the views by stamp.
-    :param callback: called as callback(stamp_ns, views, {part: message}) for each whole set.
+    The views come first and are observed at once, while earlier stages still work.
+
+    :param others: {part: (message type, topic)} that are joined with the observation by stamp.
+    :param callback: called as callback(stamp_ns, Observation, {part: message}) for each whole
+        set; the part `frames` holds the frame_id of every camera.
     """
 
     def __init__(self, node, names, others, callback):
-        """Create the subscriptions on a StageNode."""
+        """Create the subscriptions on a StageNode that declares the stage `observe`."""
         self._node, self._names, self._callback = node, names, callback
-        views = [f'{name}/{suffix}' for name in names for suffix, _ in _KINDS]
-        self.join = StampJoin([*views, *others])
+        self._views = StampJoin([f'{name}/{suffix}' for name in names for suffix, _ in _KINDS])
+        self._whole = StampJoin(['observation', 'frames', *others])
         for name in names:
             for suffix, kind in _KINDS:
                 node.subscription(kind, f'views/<camera>/{suffix}',
-                                  self._taker(f'{name}/{suffix}'), f'views/{name}/{suffix}')
+                                  self._taker(self._views, f'{name}/{suffix}', self._observe),
+                                  f'views/{name}/{suffix}')
         for part, (kind, topic) in others.items():
-            node.subscription(kind, topic, self._taker(part))
+            node.subscription(kind, topic, self._taker(self._whole, part, self._deliver))
 
-    def _taker(self, part):
+    def clear(self):
+        """Forget what waits."""
+        self._views.clear()
+        self._whole.clear()
+
+    def _taker(self, join, part, then):
         def take(message):
-            before = sum(self.join.drops.values())
-            whole = self.join.add(part, nanoseconds(message.header.stamp), message)
-            dropped = sum(self.join.drops.values()) - before
-            if dropped:
-                self._node.diagnostics.count('input', 'incomplete', dropped)
-            if whole and self._node.active:
-                self._callback(nanoseconds(message.header.stamp), self._views(whole), whole)
+            self._add(join, part, nanoseconds(message.header.stamp), message, then)
         return take
 
-    def _views(self, parts):
-        return tuple(RectifiedView(
-            camera_from_messages(name, parts[f'{name}/camera_info'], parts[f'{name}/extrinsics']),
-            depth_from_message(parts[f'{name}/depth_rect'])) for name in self._names)
+    def _add(self, join, part, stamp_ns, value, then):
+        before = sum(join.drops.values())
+        whole = join.add(part, stamp_ns, value)
+        dropped = sum(join.drops.values()) - before
+        if dropped:
+            self._node.diagnostics.count('input', 'incomplete', dropped)
+        if whole and self._node.active:
+            then(stamp_ns, whole)
+
+    def _observe(self, stamp_ns, parts):
+        frames = {name: parts[f'{name}/depth_rect'].header.frame_id for name in self._names}
+        try:
+            views = tuple(RectifiedView(
+                camera_from_messages(name, parts[f'{name}/camera_info'],
+                                     parts[f'{name}/extrinsics']),
+                depth_from_message(parts[f'{name}/depth_rect'])) for name in self._names)
+            observation = observe(views, self._node.parameters['observe'])
+        except HoocError as error:
+            self._node.diagnostics.error('views', 'refused', str(error))
+            return
+        self._add(self._whole, 'frames', stamp_ns, frames, self._deliver)
+        self._add(self._whole, 'observation', stamp_ns, observation, self._deliver)
+
+    def _deliver(self, stamp_ns, parts):
+        self._callback(stamp_ns, parts['observation'], parts)

@@ -2,8 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Play bags through the nodes, one after the other, and bring the answers back."""
 
+from pathlib import Path
+
 from hooc_perception.errors import HoocError
 from hooc_perception.supervisor.collector import Collector
+from hooc_perception.supervisor.recorder import Recorder
 from hooc_perception.supervisor.supervisor import CHAIN, REPLAY
 
 MATCH_TIMEOUT_S = 30.0
@@ -19,9 +22,13 @@ class BagRunner:
     :param timeout_s: how long one scene may take from its last image on.
     """
 
-    def __init__(self, supervisor, timeout_s=120.0):
-        """Listen."""
-        self._supervisor, self._timeout_s = supervisor, timeout_s
+    def __init__(self, supervisor, timeout_s=120.0, record=None):
+        """
+        Listen.
+
+        :param record: folder for a bag a scene of all that goes over the topics, or None.
+        """
+        self._supervisor, self._timeout_s, self._record = supervisor, timeout_s, record
         self._collector = Collector(supervisor.node)
         self._rig = None
 
@@ -35,24 +42,36 @@ class BagRunner:
         supervisor, collector = self._supervisor, self._collector
         self._set_up(bag)
         collector.expect([camera.name for camera in bag.cameras])
-        supervisor.set_parameters(REPLAY, {'bag': str(bag.path)})
+        supervisor.set_parameters(REPLAY, {'bag': str(bag.path.resolve())})
+        recorder = None
+        if self._record:
+            recorder = Recorder(supervisor.node, Path(self._record, bag.name),
+                                [camera.name for camera in bag.cameras])
         began = supervisor.node.get_clock().now().nanoseconds
         supervisor.bring_up([REPLAY])
         try:
-            self._wait(lambda: collector.replay.get('state') in ('finished', 'failed'), began,
-                       MATCH_TIMEOUT_S + self._timeout_s + _length_s(bag),
-                       f'{bag.name}: the bag could not be played to its end')
-            if collector.replay['state'] == 'failed':
-                supervisor.wait_a_moment()
-                raise HoocError(supervisor.processes[REPLAY].last_words())
-            self._wait(lambda: len(collector.stamps) == len(bag.cameras), began, 10.0,
-                       f'{bag.name}: not every camera of the bag was heard')
-            return self._wait(
-                lambda: collector.answer(min(collector.stamps.values())), began, self._timeout_s,
-                f'{bag.name}: no objects came within {self._timeout_s:g} s of the last image; '
-                'give it more time with --timeout, or a faster profile')
+            answer = self._listen(bag, began)
         finally:
-            supervisor.bring_down([REPLAY])
+            if recorder:
+                recorder.close()
+        supervisor.bring_down([REPLAY])
+        return answer
+
+    def _listen(self, bag, began):
+        """Return the Answer once the bag is played and the chain has answered."""
+        supervisor, collector = self._supervisor, self._collector
+        self._wait(lambda: collector.replay.get('state') in ('finished', 'failed'), began,
+                   MATCH_TIMEOUT_S + self._timeout_s + _length_s(bag),
+                   f'{bag.name}: the bag could not be played to its end')
+        if collector.replay['state'] == 'failed':
+            supervisor.wait_a_moment()
+            raise HoocError(supervisor.processes[REPLAY].last_words())
+        self._wait(lambda: len(collector.stamps) == len(bag.cameras), began, 10.0,
+                   f'{bag.name}: not every camera of the bag was heard')
+        return self._wait(
+            lambda: collector.answer(min(collector.stamps.values())), began, self._timeout_s,
+            f'{bag.name}: no objects came within {self._timeout_s:g} s of the last image; '
+            'give it more time with --timeout, or a faster profile')
 
     def _set_up(self, bag):
         """Bring the chain up for the bag's rig, anew where it differs from the last one."""

@@ -127,13 +127,17 @@ class Supervisor:
         self._executor.spin_once(timeout_sec=seconds)
         self.check()
 
+    def dead(self):
+        """Return the names of the nodes whose process has ended."""
+        return [name for name, process in self.processes.items()
+                if process.exit_code() is not None]
+
     def check(self):
         """Raise HoocError where a node has died."""
-        for name, process in self.processes.items():
-            code = process.exit_code()
-            if code is not None:
-                raise HoocError(f'{name} ended unexpectedly (exit code {code}): '
-                                f'{process.last_words()}')
+        for name in self.dead():
+            process = self.processes[name]
+            raise HoocError(f'{name} ended unexpectedly (exit code {process.exit_code()}): '
+                            f'{process.last_words()}')
 
     def wait(self, condition, timeout_s, complaint):
         """

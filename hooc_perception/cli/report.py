@@ -28,6 +28,7 @@ def add_arguments(parser):
 def run(args):
     """Run the command; return the exit code."""
     from hooc_perception.evaluation.evaluate import scoring_models
+    from hooc_perception.evaluation.matching import in_frame_of
     from hooc_perception.evaluation.report.page import write_report
     from hooc_perception.evaluation.report.scene import report_scene
     from hooc_perception.models.folder import load_model_folder
@@ -56,7 +57,8 @@ def run(args):
     for scene in tqdm(shown, desc='pictures', unit='scene', disable=None):
         views = scene.depth()
         more = extras.for_report(views, args.candidates) if extras else {}
-        scenes.append(report_scene(entries[scene.name], views, models, scene.truth, **more))
+        entry = in_frame_of(scene, entries[scene.name])
+        scenes.append(report_scene(entry, views, models, scene.truth, **more))
     notes = [f'Set {scene_set.name}' + ''.join(
         f', {key} {results[key]}' for key in ('profile', 'seed', 'setting') if key in results)]
     path = write_report(args.out, scenes, f'What stands on the table: {results["dataset"]}',

@@ -7,7 +7,7 @@ from pathlib import Path
 import re
 
 from hooc_perception.core.geometry import inverse, matrix_from_pose
-from hooc_perception.evaluation.matching import posed
+from hooc_perception.evaluation.matching import in_frame_of, posed
 import numpy as np
 import trimesh
 
@@ -34,6 +34,7 @@ def write_bop_csv(path, results, scene_set):
         entry = entries.get(scene.name)
         if not entry or not entry['objects']:
             continue
+        entry = in_frame_of(scene, entry)
         known = _SCENE.match(scene.name)
         for j, camera in enumerate(scene.cameras):
             view = _VIEW.match(camera.name)

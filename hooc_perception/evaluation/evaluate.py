@@ -10,7 +10,7 @@ from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.bop import bop_score
 from hooc_perception.evaluation.masks import rectified_labels, score_masks
-from hooc_perception.evaluation.matching import posed
+from hooc_perception.evaluation.matching import in_frame_of, posed
 from hooc_perception.evaluation.scores import per_category, score_scene
 from hooc_perception.evaluation.visibility import scene_visibility
 from hooc_perception.models.mesh import load_mesh
@@ -92,7 +92,7 @@ def evaluate_results(scene_set, results, models, label='', visibility=None):
     scores, masks, estimates, energy, targets = [], [], {}, {}, []
     for scene in scene_set.scenes:
         entry = by_name.get(scene.name)
-        found = [posed(o) for o in entry['objects']] if entry else []
+        found = ([posed(o) for o in in_frame_of(scene, entry)['objects']] if entry else [])
         for unknown in (o.category for o in found if o.category not in models):
             raise HoocError(f'scene {scene.name} of the results holds a {unknown!r}, which '
                             f'{scene_set.path} does not list; evaluate it against its own set')

@@ -4,6 +4,7 @@
 
 from dataclasses import dataclass
 
+from hooc_perception.core.geometry import inverse, matrix_from_pose, pose_from_matrix
 from hooc_perception.errors import HoocError
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -40,6 +41,28 @@ def posed(thing):
     except (TypeError, ValueError) as error:
         raise HoocError(f'object {get("category")!r} has no usable pose: {error}; give '
                         'translation (3), rotation_xyzw (4) and size (3)') from None
+
+
+def in_frame_of(scene, entry):
+    """
+    Return a results entry (dict) with its objects in the table frame of a Scene.
+
+    Where the world is not known to be a table's, the frame is estimated, and the results say
+    which one they used; another version may estimate another, so both are compared in the
+    source world. Entries of scenes whose table is known come back as they are.
+    """
+    if scene.table_known or not entry.get('world', {}).get('table_from_source'):
+        return entry
+    theirs = entry['world']['table_from_source']
+    T_ours_theirs = scene.table.T_table_source @ inverse(
+        matrix_from_pose(theirs['translation'], theirs['rotation_xyzw']))
+    objects = []
+    for thing in entry['objects']:
+        translation, rotation = pose_from_matrix(
+            T_ours_theirs @ matrix_from_pose(thing['translation'], thing['rotation_xyzw']))
+        objects.append(thing | {'translation': translation.tolist(),
+                                'rotation_xyzw': rotation.tolist()})
+    return entry | {'objects': objects, **scene.world}
 
 
 def match_by_centre(estimates, truths):

@@ -5,7 +5,9 @@
 import csv
 import json
 
+from hooc_perception.core.geometry import inverse, matrix_from_pose, pose_from_matrix
 from hooc_perception.evaluation.bop_csv import write_bop_csv
+from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models
 from hooc_perception.scenes.scene_set import load_scene_set
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -30,6 +32,31 @@ def test_truth_comes_back_as_scene_gt_says(shared_scenes, tmp_path):
                    + np.abs(np.array(g['cam_t_m2c']) - t).max()
                    for g in truth if g['obj_id'] == int(row['obj_id'])) < 1e-4
         assert float(row['score']) == 0.25 and float(row['time']) == 0.5
+
+
+def test_results_of_another_table_frame_are_brought_into_this_one(shared_scenes):
+    scene_set = load_scene_set(shared_scenes / 'bop_ycbv').selected(['000051_000001'])
+    (scene,), rng = scene_set.scenes, np.random.default_rng(0)
+    T_other_source = matrix_from_pose(rng.normal(size=3), Rotation.random(rng=rng).as_quat())
+    T_other_ours = T_other_source @ inverse(scene.table.T_table_source)
+
+    def placed(T, true):
+        translation, rotation = pose_from_matrix(
+            T @ matrix_from_pose(true.translation, true.rotation_xyzw))
+        return {'category': true.category, 'score': 1.0, 'translation': translation.tolist(),
+                'rotation_xyzw': rotation.tolist(), 'size': true.size.tolist()}
+
+    translation, rotation = pose_from_matrix(T_other_source)
+    entry = {'scene': scene.name, 'seconds': 1.0,
+             'objects': [placed(T_other_ours, t) for t in scene.truth],
+             'world': {'table_from_source': {'translation': translation,
+                                             'rotation_xyzw': rotation}}}
+    models = scoring_models(scene_set)
+    (score,) = evaluate_results(scene_set, {'scenes': [entry]}, models).scores
+    assert score.tight == 1 and max(o.centre_m for o in score.objects) < 1e-9
+    del entry['world']
+    (score,) = evaluate_results(scene_set, {'scenes': [entry]}, models).scores
+    assert score.tight == 0
 
 
 def test_own_sets_count_scenes_images_and_objects(tiny, truth_results, tmp_path):

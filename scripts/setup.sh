@@ -38,11 +38,11 @@ UPDATED=''
 apt_install() {
   [[ -z ${HOOC_NO_APT:-} ]] && command -v apt-get >/dev/null || return 1
   if [[ -z $UPDATED ]]; then
-    as_root apt-get update -qq >&2 || say 'apt-get update failed; trying with the lists there are'
+    as_root apt-get update -qq >/dev/null || say 'apt-get update failed; trying with the lists there are'
     UPDATED=1
   fi
   as_root env DEBIAN_FRONTEND=noninteractive \
-    apt-get install -y -qq --no-install-recommends "$@" >&2
+    apt-get install -y -qq --no-install-recommends -o Dpkg::Use-Pty=0 "$@" >/dev/null
 }
 
 missing_packages() {

@@ -23,7 +23,7 @@ ALLOWED = {
     'synthesis': {'numpy', 'scipy', 'numba', 'yaml', 'cv2', 'fcl', 'mujoco', 'trimesh',
                   'manifold3d', 'open3d', 'joblib', 'tqdm',
                   'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.scenes'},
-    'training': {'numpy', 'scipy', 'numba', 'sklearn', 'lightgbm', 'joblib', 'tqdm',
+    'training': {'numpy', 'scipy', 'numba', 'sklearn', 'joblib', 'tqdm',
                  'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.synthesis'},
     'evaluation': {'numpy', 'scipy', 'yaml', 'cv2', 'PIL', 'sklearn', 'matplotlib', 'jinja2',
                    'markupsafe', 'pyrender', 'OpenGL', 'trimesh', 'open3d', 'tqdm',

@@ -1,0 +1,65 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The documentation keeps up with the code: links lead somewhere, commands exist."""
+
+import argparse
+import importlib
+from pathlib import Path
+import re
+
+from hooc_perception.cli import main as cli
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').rglob('*.md')])
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_links_lead_somewhere(page):
+    text = re.sub(r'```.*?```', '', page.read_text(), flags=re.S)
+    broken = [target for target in re.findall(r'\]\(([^)\s]+)\)', text)
+              if not target.startswith(('http', '#', 'mailto:'))
+              and not (page.parent / target.split('#')[0]).exists()]
+    assert not broken
+
+
+def test_the_index_lists_every_page():
+    index = (ROOT / 'docs' / 'README.md').read_text()
+    unlisted = [path.name for path in (ROOT / 'docs').glob('*.md')
+                if path.name != 'README.md' and f'({path.name})' not in index]
+    assert not unlisted
+
+
+def commands_of(page):
+    """Yield the words of each `hooc ...` line in the code blocks of a page."""
+    for block in re.findall(r'```(?:bash|sh|console)?\n(.*?)```', page.read_text(), re.S):
+        for line in block.splitlines():
+            found = re.search(r'(?:^|\s|/)hooc (?=[a-z])(.*)', line.split('#')[0])
+            if found:
+                yield found[1].split()
+
+
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_commands_have_the_options_that_the_page_shows(page):
+    for command, *words in commands_of(page):
+        assert command in cli.COMMANDS, command
+        if command not in cli.available():
+            continue
+        parser = argparse.ArgumentParser()
+        importlib.import_module(f'hooc_perception.cli.{command}').add_arguments(parser)
+        known = set(parser._option_string_actions)
+        assert {word.split('=')[0] for word in words if word.startswith('--')} <= known, command
+
+
+def test_the_readme_lists_every_command():
+    readme = (ROOT / 'README.md').read_text()
+    assert not [name for name in cli.COMMANDS if f'| `hooc {name}` |' not in readme]
+
+
+def test_every_pinned_direct_dependency_is_explained():
+    text = (ROOT / 'docs' / 'libraries.md').read_text().lower()
+    direct = (ROOT / 'requirements.in').read_text().split('# ROS 2')[0]
+    names = [line for line in direct.splitlines() if line and not line.startswith('#')]
+    aliases = {'opencv-python-headless': 'opencv', 'networkx': 'trimesh'}
+    missing = [name for name in names if aliases.get(name, name).lower() not in text]
+    assert not missing

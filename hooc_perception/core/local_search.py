@@ -22,8 +22,8 @@ class LocalSearchConfig(Config):
     """Parameters of the iterated local search."""
 
     patience: int = param(
-        30, 'kicks in a row without a gain after which the search has converged; finds the best '
-        'known of long runs on every development scene', low=0)
+        30, 'kicks in a row without a gain after which the search has converged; as good as '
+        'long runs in 36 of 36 trials on pools of 125 candidates', low=0)
     kick: int = param(5, 'most random flips of a kick; each kick draws 1 to this many', low=1)
     swaps: bool = param(True, 'whether a member may be exchanged for an outsider in one step')
 

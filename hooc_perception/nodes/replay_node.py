@@ -7,7 +7,7 @@ import json
 import sys
 
 from geometry_msgs.msg import PoseArray, TransformStamped
-from hooc_perception.core.config import Config, param
+from hooc_perception.core.config import param
 from hooc_perception.core.geometry import pose_from_matrix
 from hooc_perception.errors import HoocError
 from hooc_perception.replay.bag_reader import BagScene, iter_messages
@@ -18,7 +18,7 @@ from hooc_perception.ros.conversions import (
     time_message,
     transform_message,
 )
-from hooc_perception.ros.player import Player
+from hooc_perception.ros.player import Player, PlayerConfig
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_node import StageNode
 from rclpy.duration import Duration
@@ -28,21 +28,14 @@ from std_msgs.msg import String
 
 
 @dataclass(frozen=True)
-class ReplayConfig(Config):
+class ReplayConfig(PlayerConfig):
     """Parameters of the replay node."""
 
     bag: str = param('', 'The rosbag2 folder, or its .mcap or .db3 file.')
-    rate: float = param(1.0, 'Speed: 1 as recorded; 0 sends a frame set when the last one is '
-                        'answered on objects/poses, as fast as the chain takes them.', '', 0.0,
-                        100.0)
-    loop: bool = param(False, 'Start again at the end.')
-    restamp: bool = param(True, 'Give the images stamps of now; without, the recorded ones.')
     wait_for_subscribers: int = param(1, 'Send nothing before every image topic has so many '
                                       'subscribers.', '', 0, 100)
     match_timeout_s: float = param(30.0, 'Give up waiting for subscribers after this time.',
                                    's', 0.1, 3600.0)
-    min_gap_s: float = param(0.005, 'Least time between two images: large messages sent back to '
-                             'back are what gets lost.', 's', 0.0, 1.0)
     answer_timeout_s: float = param(60.0, 'At rate 0: go on without an answer after this time.',
                                     's', 0.1, 3600.0)
 
@@ -147,8 +140,7 @@ class ReplayNode(StageNode):
                 *pose_from_matrix(self.cameras[name].T_world_camera),
                 header(self.now_ns(), self.frame), frames[name]))
             extrinsics.wait_for_all_acked(Duration(seconds=1))
-        self.player = Player(self.recorded_images, self.config.rate, self.config.restamp,
-                             self.config.loop, round(self.config.min_gap_s * 1e9))
+        self.player = Player(self.recorded_images, self.config)
         self.say('playing')
 
     def recorded_images(self):

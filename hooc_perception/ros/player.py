@@ -4,6 +4,8 @@
 
 from dataclasses import dataclass
 
+from hooc_perception.core.config import Config, param
+
 
 @dataclass(frozen=True)
 class Due:
@@ -14,23 +16,32 @@ class Due:
     message: object
 
 
+@dataclass(frozen=True)
+class PlayerConfig(Config):
+    """How recorded images are paced."""
+
+    rate: float = param(1.0, 'Speed: 1 as recorded; 0 sends a frame set when the last one is '
+                        'answered on objects/poses, as fast as the chain takes them.', '', 0.0,
+                        100.0)
+    loop: bool = param(False, 'Start again at the end.')
+    restamp: bool = param(True, 'Give the images stamps of now, with the recorded distances (by '
+                          'rate); without, the recorded ones.')
+    min_gap_s: float = param(0.005, 'Least time between two images: large messages sent back to '
+                             'back are what gets lost.', 's', 0.0, 1.0)
+
+
 class Player:
     """
     Pace recorded images like live cameras.
 
     :param images: callable that returns a fresh iterator of (camera, stamp_ns, message) in
         the order of time.
-    :param rate: 1 = as recorded, 2 = twice as fast; 0 = a frame set each time `released()` is
-        called, as fast as the chain answers.
-    :param restamp: True gives stamps of now, with the recorded distances (by `rate`).
-    :param min_gap_ns: at least this between two images: large messages sent back to back are
-        what gets lost.
     """
 
-    def __init__(self, images, rate=1.0, restamp=True, loop=False, min_gap_ns=5_000_000):
+    def __init__(self, images, config=PlayerConfig()):
         """Start with the first image at the first call of `due`."""
-        self._images, self.rate, self.restamp, self.loop = images, rate, restamp, loop
-        self._min_gap_ns = min_gap_ns
+        self._images, self.rate, self.restamp = images, config.rate, config.restamp
+        self.loop, self._min_gap_ns = config.loop, round(config.min_gap_s * 1e9)
         self._iterator, self._next = iter(images()), None
         self._start = self._first = None    # node time and recorded stamp of the first image
         self._last_time = None

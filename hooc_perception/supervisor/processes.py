@@ -36,6 +36,8 @@ class NodeProcess:
         self._process = subprocess.Popen(
             [sys.executable, '-m', module or f'hooc_perception.nodes.{name}', '--ros-args',
              '-r', f'__ns:={namespace}',
+             # What they say comes through the pipe; no files in the home directory as well.
+             '--disable-external-lib-logs',
              *(word for file in params_files for word in ('--params-file', str(file)))],
             env=child_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True, errors='replace', start_new_session=True)

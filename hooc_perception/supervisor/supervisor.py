@@ -110,7 +110,8 @@ class Supervisor:
                                                self._modules.get(name))
         self._context = rclpy.Context()
         # Signals are ours: rclpy would only shut its context down and leave the nodes.
-        rclpy.init(context=self._context, signal_handler_options=SignalHandlerOptions.NO)
+        rclpy.init(args=['--ros-args', '--disable-external-lib-logs'], context=self._context,
+                   signal_handler_options=SignalHandlerOptions.NO)
         self.node = rclpy.create_node('hooc_supervisor', namespace=self.namespace,
                                       context=self._context)
         self._executor = SingleThreadedExecutor(context=self._context)

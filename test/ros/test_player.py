@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded images are paced like live ones."""
 
-from hooc_perception.ros.player import Player
+from hooc_perception.ros.player import Player, PlayerConfig
 
 MS = 1_000_000
 RECORDED = [(camera, 5_000 * MS + i * 100 * MS, f'{camera}{i}')
@@ -35,31 +35,31 @@ def test_recorded_distances_and_a_gap():
 
 
 def test_rate():
-    out = play(Player(lambda: iter(RECORDED), rate=2.0))
+    out = play(Player(lambda: iter(RECORDED), PlayerConfig(rate=2.0)))
     assert [t for t, _ in out] == [0, 5, 50, 55, 100, 105]
     assert [d.stamp_ns // MS - 77_000 for _, d in out] == [0, 0, 50, 50, 100, 100]
 
 
 def test_recorded_stamps_on_request():
-    out = play(Player(lambda: iter(RECORDED), restamp=False))
+    out = play(Player(lambda: iter(RECORDED), PlayerConfig(restamp=False)))
     assert [d.stamp_ns for _, d in out] == [stamp for _, stamp, _ in RECORDED]
 
 
 def test_loop_starts_again_with_later_stamps():
-    out = play(Player(lambda: iter(RECORDED), loop=True), until_ms=700)
+    out = play(Player(lambda: iter(RECORDED), PlayerConfig(loop=True)), until_ms=700)
     assert len(out) > 12
     stamps = [d.stamp_ns for _, d in out if d.camera == 'a']
     assert all(x < y for x, y in zip(stamps, stamps[1:]))
 
 
 def test_rate_zero_waits_for_answers():
-    player = Player(lambda: iter(RECORDED), rate=0.0)
+    player = Player(lambda: iter(RECORDED), PlayerConfig(rate=0.0))
     assert [d.message for _, d in play(player)] == ['a0', 'b0']
     assert player.waits_for_release and player.set_stamp_ns == 77_000 * MS
 
 
 def test_rate_zero_goes_as_fast_as_answers_come():
-    out = play(Player(lambda: iter(RECORDED), rate=0.0), answer_after_ms=10)
+    out = play(Player(lambda: iter(RECORDED), PlayerConfig(rate=0.0)), answer_after_ms=10)
     assert [d.message for _, d in out] == ['a0', 'b0', 'a1', 'b1', 'a2', 'b2']
     assert out[-1][0] < 60
 
@@ -71,5 +71,5 @@ def test_late_timer_catches_up():
 
 
 def test_empty_recording():
-    player = Player(lambda: iter([]), loop=True)
+    player = Player(lambda: iter([]), PlayerConfig(loop=True))
     assert player.finished and player.due(0) is None

@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 from hooc_perception.core.observe import ObserveConfig
 from hooc_perception.core.types import Energy, PixelProbabilities
+from hooc_perception.evaluation import rerun as rerun_module
 from hooc_perception.evaluation.paper_tables import energy_table, stage_table
 from hooc_perception.evaluation.stages import as_candidates, true_classes
 from hooc_perception.evaluation.tables import to_text
@@ -13,8 +14,6 @@ from hooc_perception.models.derive import derive
 import numpy as np
 import pytest
 import trimesh
-
-rerun_module = pytest.importorskip('hooc_perception.evaluation.rerun')
 
 
 @pytest.fixture

@@ -1,0 +1,128 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`hooc train` from meshes to a MODEL folder that classifies, with tiny settings."""
+
+from dataclasses import dataclass
+
+from hooc_perception.cli import main
+from hooc_perception.core.classify import classify
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.observe import observe
+from hooc_perception.errors import HoocError
+from hooc_perception.models.folder import load_model_folder
+from hooc_perception.synthesis.rigs import ring
+from hooc_perception.synthesis.training_scenes import training_scene
+from hooc_perception.training import train as module
+from hooc_perception.training.fit_forest import FitConfig
+from hooc_perception.training.fit_pixels import PixelFitConfig
+from hooc_perception.training.fused_scenes import draw_rows, FusedScenesConfig
+import numpy as np
+import pytest
+import trimesh
+
+TINY = {
+    'paper': (PixelFitConfig(structure_scenes=10, leaf_scenes=10, trees=2, structure_pixels=150,
+                             leaf_pixels=300, tests_per_node=60),),
+    'fast': (FusedScenesConfig(scenes=10, quantile_scenes=4, objects_low=3, probes=16),
+             FitConfig(trees=5, features_per_node=40, min_leaf=5)),
+}
+
+
+@dataclass
+class MeshSet:
+    """A scene set without scenes: reading them would raise AttributeError."""
+
+    path: object
+    name: str
+    categories: tuple
+    cameras: tuple
+    max_instances: int = 1
+
+
+@dataclass
+class MeshCategory:
+    """As scenes.Category."""
+
+    name: str
+    mesh_path: object
+    scale: float = 1.0
+
+
+@pytest.fixture(scope='module')
+def mesh_set(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('meshes')
+    shapes = {'can': trimesh.creation.cylinder(0.035, 0.12),
+              'plate': trimesh.creation.cylinder(0.11, 0.02),
+              'box': trimesh.creation.box((0.07, 0.15, 0.2))}
+    for name, mesh in shapes.items():
+        mesh.export(folder / f'{name}.ply')
+    return MeshSet(folder, 'tiny', tuple(MeshCategory(n, folder / f'{n}.ply') for n in shapes),
+                   ring(np.random.default_rng(0), 2, 256, 212, 183.0), 2)
+
+
+@pytest.fixture(scope='module', params=list(TINY))
+def trained(request, mesh_set, tmp_path_factory):
+    out = tmp_path_factory.mktemp('models') / request.param
+    return module.train(mesh_set, out, request.param, seed=3, progress=False,
+                        configs=TINY[request.param], jobs=1)
+
+
+def test_the_folder_holds_what_was_learnt(trained, mesh_set):
+    again = load_model_folder(trained.path)
+    assert [m.name for m in again.models] == ['can', 'plate', 'box']
+    assert again.profile in TINY and again.seed == 3 and again.max_instances == 2
+    assert int(again.classifier['classes']) == 3
+    assert '"seed": 3' in str(again.classifier['settings'])
+
+
+def test_it_tells_plain_shapes_apart_in_fresh_scenes(trained, mesh_set):
+    right = []
+    for k in range(4):
+        scene = training_scene(trained.models, mesh_set.cameras, stage_rng(99, 'fresh', k))
+        result = classify(observe(scene.views), trained.classifier)
+        truth = np.array([scene.labels[c][v, u]
+                          for c, (u, v) in zip(result.camera, result.uv)])
+        right.append((result.p.argmax(1) == truth)[truth > 0])
+    assert np.concatenate(right).mean() > 0.65
+
+
+def test_same_seed_same_model_whatever_the_workers(trained, mesh_set):
+    again = module.train_classifier(trained.models, mesh_set.cameras, trained.profile, 3, 2,
+                                    TINY[trained.profile], jobs=2)
+    assert set(again) == set(trained.classifier)
+    for key, value in again.items():
+        assert np.array_equal(value, trained.classifier[key]), key
+
+
+def test_extra_steps_add_arrays_and_see_those_before(mesh_set, trained, monkeypatch):
+    def step(context):
+        assert 'kind' in context.classifier and len(context.models) == 3
+        return {'verifier_weights': np.arange(4.0)}
+
+    monkeypatch.setattr(module, 'EXTRA_STEPS', [step])
+    arrays = module.train_classifier(trained.models, mesh_set.cameras, 'paper', 0, 2,
+                                     (PixelFitConfig(structure_scenes=2, leaf_scenes=2, trees=1,
+                                                     tests_per_node=5),), 1)
+    assert (arrays['verifier_weights'] == np.arange(4.0)).all()
+
+
+def test_rows_favour_small_classes():
+    y = np.repeat([0, 1, 2], [10000, 100, 4])
+    rows = draw_rows(y, np.random.default_rng(0), 2.0)
+    assert (np.bincount(y[rows]) == [200, 20, 4]).all() and (np.diff(rows) > 0).all()
+
+
+def test_bad_input_is_named(mesh_set, tmp_path):
+    with pytest.raises(HoocError, match='profile'):
+        module.train(mesh_set, tmp_path, 'slow')
+    empty = MeshSet(mesh_set.path, 'none', (), mesh_set.cameras)
+    with pytest.raises(HoocError, match='no categories'):
+        module.train(empty, tmp_path, 'fast')
+    blind = MeshSet(mesh_set.path, 'none', mesh_set.categories, ())
+    with pytest.raises(HoocError, match='no cameras'):
+        module.train(blind, tmp_path, 'fast')
+
+
+def test_the_command_refuses_a_missing_set(tmp_path, capsys):
+    assert main.main(['train', str(tmp_path / 'nothing'), '--out', str(tmp_path / 'm')]) != 0
+    assert 'nothing' in capsys.readouterr().err

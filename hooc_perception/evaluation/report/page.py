@@ -14,7 +14,7 @@ import numpy as np
 
 MARGIN = 0.03
 REACH_M = 0.5
-MAX_REJECTED = 40
+MAX_REJECTED = 80
 TERMS = ('depth', 'probability', 'overlap')
 
 

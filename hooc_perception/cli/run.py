@@ -20,7 +20,9 @@ def add_arguments(parser):
     parser.add_argument('--out', type=Path, required=True, metavar='RESULTS.json')
     parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
                         help='default: the one the model was trained for')
-    parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
+    parser.add_argument('--seed', type=int, help="default: the model's")
+    parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
+                        help='change one parameter of the profile; may be repeated')
     parser.add_argument('--report', type=Path, metavar='DIR',
                         help='write a report with pictures to DIR/report.html')
     parser.add_argument('--record', type=Path, metavar='DIR',
@@ -37,23 +39,28 @@ def run(args):
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.replay.bag_reader import BagScene
     from hooc_perception.scenes.results import scene_result, write_results
-    if args.seed < 0 or not args.timeout > 0:
-        raise HoocError('--seed must not be negative and --timeout must be positive')
+    if not args.timeout > 0:
+        raise HoocError(f'--timeout is {args.timeout:g}; give the seconds that a scene may take')
     model = load_model_folder(args.model)
     bags = [BagScene(path) for path in bag_paths(args.bags)]
+    names = [bag.name for bag in bags]
     for bag in bags:
+        if names.count(bag.name) > 1:
+            raise HoocError(f'two bags hold the scene {bag.name!r}; run them one at a time')
         bag.views()     # a bag that cannot be used is better refused before anything starts
     profile = args.profile or model.profile
-    answers = play(bags, args, profile)
-    names = [m.name for m in model.models]
-    entries = [scene_result(bag.name, answer.parsed, names, answer.seconds, **bag.world)
+    seed = model.seed if args.seed is None else args.seed
+    parameters = chain_parameters(args, profile, seed)
+    answers = play(bags, args, parameters)
+    classes = [m.name for m in model.models]
+    entries = [scene_result(bag.name, answer.parsed, classes, answer.seconds, **bag.world)
                for bag, answer in zip(bags, answers)]
-    write_results(args.out, bags[0].info['dataset'], entries, profile=profile, seed=args.seed)
+    write_results(args.out, bags[0].info['dataset'], entries, profile=profile, seed=seed)
     found = sum(len(entry['objects']) for entry in entries)
     print(f'{args.out}: {found} objects in {len(entries)} '
           f'scene{"s" if len(entries) != 1 else ""}')
     if args.report:
-        write_report(args.report, bags, answers, entries, model, profile, args.seed)
+        write_report(args.report, bags, answers, entries, model, profile, seed)
 
 
 def bag_paths(given):
@@ -65,13 +72,36 @@ def bag_paths(given):
     return paths
 
 
-def play(bags, args, profile):
+def chain_parameters(args, profile, seed):
+    """
+    Return {node: parameters} of the chain for model, profile, seed and --set-parameter.
+
+    :raises HoocError: where a parameter is unknown, or its value is refused.
+    """
+    from hooc_perception.cli.overrides import overrides_of
+    from hooc_perception.core import profiles
+    from hooc_perception.supervisor.supervisor import CHAIN
+    if seed < 0:
+        raise HoocError(f'--seed is {seed}; it must not be negative')
+    common = {'model': str(args.model.resolve()), 'profile': profile, 'seed': seed}
+    parameters = {name: dict(common) for name in CHAIN}
+    overrides = overrides_of(getattr(args, 'set_parameter', ()))
+    changed = profiles.with_overrides(profiles.profile(profile), overrides)
+    of_stage = {'observe': CHAIN, 'classify': CHAIN[1:2], 'propose': CHAIN[2:3],
+                'parse': CHAIN[3:]}
+    for key in overrides:
+        stage, _, name = key.partition('.')
+        for node in of_stage[stage]:
+            # As the Config has it: 2 for a float became 2.0, which ROS insists on.
+            parameters[node][key] = getattr(getattr(changed, stage), name)
+    return parameters
+
+
+def play(bags, args, parameters):
     """Return the Answer of every bag."""
     from hooc_perception.supervisor.bags import BagRunner, LISTENERS, MATCH_TIMEOUT_S
     from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
     from tqdm import tqdm
-    stage = {'model': str(args.model.resolve()), 'profile': profile, 'seed': args.seed}
-    parameters = {name: dict(stage) for name in CHAIN}
     # A recorded frame set is complete however long it waits.
     parameters['ingestion_node'].update(max_frame_age_s=0.0, wait_for_answer_s=args.timeout)
     parameters[REPLAY] = {'wait_for_subscribers': LISTENERS, 'match_timeout_s': MATCH_TIMEOUT_S}

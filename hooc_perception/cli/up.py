@@ -4,8 +4,6 @@
 
 from pathlib import Path
 
-from hooc_perception.errors import HoocError
-
 HELP = ('Start the four nodes of the chain for live cameras and keep them up until '
         'interrupted. Cameras publish <camera>/depth/image_raw and camera_info under /hooc; '
         'answers come on /hooc/objects/poses and /hooc/objects/attributes.')
@@ -20,7 +18,9 @@ def add_arguments(parser):
                              'model and poses from <camera>/extrinsics or /tf_static')
     parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
                         help='default: the one the model was trained for')
-    parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
+    parser.add_argument('--seed', type=int, help="default: the model's")
+    parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
+                        help='change one parameter of the profile; may be repeated')
     parser.add_argument('--namespace', default='/hooc', help='default: %(default)s')
     parser.add_argument('--params', type=Path, metavar='FILE',
                         help='YAML of node parameters, as config/perception.yaml')
@@ -29,14 +29,12 @@ def add_arguments(parser):
 
 def run(args):
     """Run the command until it is interrupted."""
+    from hooc_perception.cli.run import chain_parameters
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.supervisor.supervisor import CHAIN, Supervisor
-    if args.seed < 0:
-        raise HoocError('--seed must not be negative')
     model = load_model_folder(args.model)
-    stage = {'model': str(args.model.resolve()), 'profile': args.profile or model.profile,
-             'seed': args.seed}
-    parameters = {name: dict(stage) for name in CHAIN}
+    parameters = chain_parameters(args, args.profile or model.profile,
+                                  model.seed if args.seed is None else args.seed)
     if args.cameras:
         poses = camera_poses(args.cameras)
         for name in CHAIN:

@@ -8,16 +8,19 @@ import time
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe
+from hooc_perception.core.pipeline import proposer
 from hooc_perception.core.propose import propose
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.conversions import header
+from hooc_perception.ros.reproposal import parsed_request
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_messages import candidates_messages, probabilities_from_message
 from hooc_perception.ros.stage_node import StageConfig, StageNode
 from hooc_perception.ros.view_topics import ViewInput
 from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
 
 
 class CandidateNode(StageNode):
@@ -31,31 +34,59 @@ class CandidateNode(StageNode):
         """Load the generic models, build the endpoints."""
         model = model_of(self.config)
         self.models = model.models
-        warmed(self, model, lambda views, probabilities, _, models: propose(
-            observe(views, self.parameters['observe']), probabilities, models,
-            self.parameters['propose'], stage_rng(self.config.seed, 'propose')))
+        warmed(self, model, self.try_out)
+        self.latest = None          # (stamp, what proposes anew for it)
         self.poses = self.publisher(PoseArray, 'candidates/poses')
         self.attributes = self.publisher(PointCloud2, 'candidates/attributes')
+        self.more_poses = self.publisher(PoseArray, 'candidates/more/poses')
+        self.more_attributes = self.publisher(PointCloud2, 'candidates/more/attributes')
+        self.subscription(String, 'candidates/requests', self.on_request)
         self.input = ViewInput(self, camera_names(self.config, model),
                                {'probabilities': (PointCloud2, 'pixels/probabilities')},
                                self.on_set)
 
+    def try_out(self, views, probabilities, candidates, models):
+        """Propose for a made-up scene, and once more for what its first object leaves."""
+        observation = observe(views, self.parameters['observe'])
+        config, seed = self.parameters['propose'], self.config.seed
+        propose(observation, probabilities, models, config, stage_rng(seed, 'propose'))
+        proposer(observation, probabilities, models, config, seed)(candidates.take([0]), 1)
+
     def on_set(self, stamp_ns, observation, messages):
         """Propose candidates for one frame set."""
         start = time.monotonic()
+        probabilities = probabilities_from_message(messages['probabilities'])
         try:
-            candidates = propose(
-                observation, probabilities_from_message(messages['probabilities']), self.models,
-                self.parameters['propose'], stage_rng(self.config.seed, 'propose'))
+            candidates = propose(observation, probabilities, self.models,
+                                 self.parameters['propose'],
+                                 stage_rng(self.config.seed, 'propose'))
         except HoocError as error:
             self.diagnostics.error('propose', 'refused', str(error))
             return
+        self.latest = stamp_ns, proposer(observation, probabilities, self.models,
+                                         self.parameters['propose'], self.config.seed)
         poses, attributes = candidates_messages(candidates,
                                                 header(stamp_ns, self.config.target_frame))
         self.attributes.publish(attributes)
         self.poses.publish(poses)
         self.diagnostics.ok('propose', seconds=time.monotonic() - start,
                             candidates=len(candidates))
+
+    def on_request(self, message):
+        """Propose anew for what the objects chosen so far leave unexplained."""
+        try:
+            stamp_ns, turn, objects = parsed_request(message.data)
+            if not self.active or self.latest is None or self.latest[0] != stamp_ns:
+                return
+            more = self.latest[1](objects, turn)
+        except HoocError as error:
+            self.diagnostics.error('propose', 'refused', str(error))
+            return
+        poses, attributes = candidates_messages(
+            more, header(stamp_ns, self.config.target_frame), turn)
+        self.more_attributes.publish(attributes)
+        self.more_poses.publish(poses)
+        self.diagnostics.ok('propose', candidates_round=len(more))
 
 
 def main(args=None):

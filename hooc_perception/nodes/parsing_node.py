@@ -18,6 +18,7 @@ from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.detect_service import DetectService
 from hooc_perception.ros.object_output import ObjectOutput
+from hooc_perception.ros.reproposal import MoreCandidates
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_messages import candidates_from_messages, probabilities_from_message
 from hooc_perception.ros.stage_node import StageConfig, StageNode
@@ -32,6 +33,9 @@ class ParsingConfig(StageConfig):
 
     max_instances: int = param(-1, 'Objects of one category in a scene at most; 0 sets no '
                                "limit, -1 takes the model's.", '', -1, 1000)
+    more_timeout_s: float = param(60.0, 'A round of re-proposal that the candidate node does not '
+                                  'answer within this time brings nothing.', 's', 0.1, 600.0,
+                                  runtime=True)
     detect_timeout_s: float = param(30.0, 'The detect service gives up after this time.', 's',
                                     0.1, 600.0, runtime=True)
 
@@ -57,6 +61,7 @@ class ParsingNode(StageNode):
             'probabilities': (PointCloud2, 'pixels/probabilities'),
             'poses': (PoseArray, 'candidates/poses'),
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set)
+        self.more = MoreCandidates(self)
         self.detect = DetectService(self)
         self.owned(self.destroy_service, self.create_service(SetBool, 'enable', self.on_enable))
         self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
@@ -82,7 +87,7 @@ class ParsingNode(StageNode):
                 observation, probabilities_from_message(messages['probabilities']),
                 candidates_from_messages(messages['poses'], messages['attributes']),
                 self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
-                self.max_instances)
+                self.max_instances, self.more.asker(stamp_ns, self.config.more_timeout_s))
         except HoocError as error:
             self.diagnostics.error('parse', 'refused', str(error))
             return

@@ -25,6 +25,7 @@ class Answer:
     What the nodes found for one frame set.
 
     :ivar seconds: from the last depth image's arrival to the objects' publication.
+    :ivar parsed: its pool holds the first proposals, not those of later rounds.
     :ivar probabilities: PixelProbabilities, None if they were not heard.
     """
 
@@ -107,8 +108,7 @@ class Collector:
         found = candidates_from_messages(poses, attributes)
         rows = cloud_rows(attributes)
         pool = self._pool(stamp_ns)
-        if pool is None or len(pool) != summary['candidates']:
-            pool = found if pool is None else pool
+        pool = found if pool is None else pool
         energy = summary['energy']
         parsed = ParsedScene(
             found, Energy(energy['depth'], energy['probability'], energy['overlap']),

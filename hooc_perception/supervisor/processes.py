@@ -3,6 +3,7 @@
 """A node as a process: start it, pass on what it says, notice its end, end it."""
 
 from collections import deque
+import json
 import re
 import signal
 import subprocess
@@ -22,11 +23,13 @@ class NodeProcess:
     :ivar name: of the node, which is also that of its module in hooc_perception.nodes.
     """
 
-    def __init__(self, name, params_files, namespace, verbose=False, module=None):
+    def __init__(self, name, parameters, namespace, params_file=None,
+                 verbose=False, module=None):
         """
         Start the process.
 
-        :param params_files: YAML files of parameters, the later win.
+        :param parameters: {name: value}; empty lists and None are left at their defaults.
+        :param params_file: YAML of the user; `parameters` win over it.
         :param verbose: pass on everything; else only warnings and errors.
         :param module: another module to run, in tests.
         """
@@ -38,7 +41,8 @@ class NodeProcess:
              '-r', f'__ns:={namespace}',
              # What they say comes through the pipe; no files in the home directory as well.
              '--disable-external-lib-logs',
-             *(word for file in params_files for word in ('--params-file', str(file)))],
+             *(['--params-file', str(params_file)] if params_file else []),
+             *(word for item in parameters.items() for word in _assignment(*item))],
             env=child_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT, text=True, errors='replace', start_new_session=True)
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -88,3 +92,10 @@ class NodeProcess:
             if line and (self._verbose or not line.startswith(_QUIET)):
                 print(f'[{self.name}] {line}', file=sys.stderr, flush=True)
         self._process.stdout.close()
+
+
+def _assignment(name, value):
+    """Return the arguments that set a parameter: JSON is YAML, so nothing needs a file."""
+    if value is None or value in ((), []):
+        return []
+    return ['-p', f'{name}:={json.dumps(value)}']

@@ -3,9 +3,7 @@
 """Bring the nodes up as separate processes, watch them, leave nothing behind."""
 
 from pathlib import Path
-import shutil
 import signal
-import tempfile
 import time
 
 from hooc_perception.errors import HoocError
@@ -18,7 +16,6 @@ from rcl_interfaces.srv import SetParametersAtomically
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
-import yaml
 
 CHAIN = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node')
 REPLAY = 'replay_node'
@@ -51,7 +48,7 @@ class Supervisor:
         self._params_file = Path(params_file) if params_file else None
         if self._params_file and not self._params_file.is_file():
             raise HoocError(f'{params_file}: there is no such file of parameters')
-        self.processes, self._clients, self._claim, self._folder = {}, {}, None, None
+        self.processes, self._clients, self._claim = {}, {}, None
         self.node = None
 
     def __enter__(self):
@@ -87,8 +84,6 @@ class Supervisor:
             if self.node is not None:
                 self.node.destroy_node()
                 rclpy.try_shutdown(context=self._context)
-            if self._folder:
-                shutil.rmtree(self._folder, ignore_errors=True)
             if self._claim:
                 self._claim.close()
             for number, handler in self._old_handlers.items():
@@ -98,16 +93,10 @@ class Supervisor:
         if self._isolated:
             self._claim = isolate()
         use_large_segments(len(self.names) + 1)
-        self._folder = tempfile.mkdtemp(prefix='hooc-')
         for name in self.names:
-            path = Path(self._folder, f'{name}.yaml')
-            path.write_text(yaml.safe_dump({'/**': {'ros__parameters': {
-                k: list(v) if isinstance(v, tuple) else v
-                for k, v in self._parameters.get(name, {}).items() if v not in ((), [], None)}}}),
-                encoding='utf-8')
-            files = [self._params_file] * bool(self._params_file) + [path]
-            self.processes[name] = NodeProcess(name, files, self.namespace, self._verbose,
-                                               self._modules.get(name))
+            self.processes[name] = NodeProcess(
+                name, self._parameters.get(name, {}), self.namespace, self._params_file,
+                self._verbose, self._modules.get(name))
         self._context = rclpy.Context()
         # Signals are ours: rclpy would only shut its context down and leave the nodes.
         rclpy.init(args=['--ros-args', '--disable-external-lib-logs'], context=self._context,

@@ -49,7 +49,7 @@ class Stages:
 
     def __init__(self, scene):
         self.views, self.p, self.candidates, self.models = scene
-        self.given, self.chosen, self.refuse = {}, [0, 2], None
+        self.given, self.chosen, self.refuse, self.turns = {}, [0, 2], None, ()
 
     def classify(self, observation, classifier, config):
         self.given['classify'] = observation, classifier
@@ -61,7 +61,9 @@ class Stages:
         return type(pool)(pool.category, pool.translation * 1.0000001, pool.rotation_xyzw,
                           pool.size, pool.score)
 
-    def parse(self, observation, probabilities, pool, models, config, rng, max_instances=0):
+    def parse(self, observation, probabilities, pool, models, config, rng, max_instances=0,
+              more=None):
+        self.asked = [more(pool.take(self.chosen), turn) for turn in self.turns]
         self.given['parse'] = observation, probabilities, pool, rng.random(), max_instances
         if self.refuse:
             raise HoocError(self.refuse)
@@ -159,6 +161,18 @@ def test_stages_get_what_the_one_process_chain_gives_them(chain, folder):
     same_bits(stages.given['parse'][2], pool)
     assert stages.given['propose'][3] == stage_rng(SEED, 'propose').random()
     assert stages.given['parse'][3:] == (stage_rng(SEED, 'parse').random(), 1)
+
+
+def test_parsing_without_a_candidate_node_goes_on(chain):
+    stages, bench, send = chain
+    from rclpy.parameter import Parameter
+    stages.turns = (1,)
+    bench.chain[3].set_parameters([Parameter('more_timeout_s', value=0.2)])
+    # In one thread the candidate node cannot work while parsing waits: nobody answers.
+    send()
+    assert bench.spin(lambda: 'parse' in stages.given)
+    assert len(stages.asked[0]) == 0
+    assert bench.reasons(bench.chain[3])['parse'][0] == 'no_more_candidates'
 
 
 def test_the_answer_on_its_topics(chain, folder):

@@ -1,0 +1,124 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parsing asks for more candidates in the middle of its work and gets them unchanged."""
+
+import threading
+
+from hooc_perception.core.types import Candidates
+from hooc_perception.errors import HoocError
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.ros import reproposal  # noqa: E402
+from hooc_perception.ros.conversions import header  # noqa: E402
+from hooc_perception.ros.qos import qos  # noqa: E402
+from hooc_perception.ros.stage_messages import candidates_messages  # noqa: E402
+from hooc_perception.ros.stage_node import StageConfig, StageNode  # noqa: E402
+from sensor_msgs.msg import PointCloud2  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+
+
+def some(n, seed=0):
+    rng = np.random.default_rng(seed)
+    return Candidates(rng.integers(1, 9, n).astype(np.uint16), rng.normal(size=(n, 3)),
+                      rng.normal(size=(n, 4)), rng.random((n, 3), np.float32),
+                      rng.random(n, np.float32))
+
+
+def same(a, b):
+    for name in ('category', 'translation', 'rotation_xyzw', 'size', 'score'):
+        mine, theirs = getattr(a, name), getattr(b, name)
+        assert mine.dtype == theirs.dtype and mine.shape == theirs.shape
+        assert mine.tobytes() == theirs.tobytes(), name
+
+
+@pytest.mark.parametrize('n', [0, 1, 20])
+def test_requests_come_back_exactly(n):
+    stamp, turn, objects = reproposal.parsed_request(
+        reproposal.request_text(10**18 + 1, 2, some(n)))
+    assert (stamp, turn) == (10**18 + 1, 2)
+    same(objects, some(n))
+
+
+@pytest.mark.parametrize('text', ['', '[]', '{}', '{"format": "hooc-request/9"}'])
+def test_foreign_requests_are_refused(text):
+    with pytest.raises(HoocError, match='candidates/requests'):
+        reproposal.parsed_request(text)
+
+
+class Asking(StageNode):
+    """Has nothing but the asking side."""
+
+    def __init__(self, **kwargs):
+        super().__init__('asking', StageConfig(), **kwargs)
+
+    def configure(self):
+        self.more = reproposal.MoreCandidates(self)
+
+
+@pytest.fixture
+def asking(bench):
+    """Return (active asking node, function that answers from the peer's thread)."""
+    node = bench.add(Asking)
+    # Not spun while it asks, as in the middle of a callback.
+    bench.executor.remove_node(node)
+    answers = [bench.peer.create_publisher(kind, f'candidates/more/{part}',
+                                           qos(f'candidates/more/{part}'))
+               for part, kind in (('poses', PoseArray), ('attributes', PointCloud2))]
+    requests = bench.hear(String, 'candidates/requests', qos('candidates/requests'))
+    node.trigger_configure()
+    node.trigger_activate()
+    assert bench.spin(lambda: all(p.get_subscription_count() for p in answers)
+                      and node.count_subscribers('/hooc/candidates/requests'))
+    bench.rest(0.2)
+
+    def answer(candidates, stamp_ns, turn):
+        messages = candidates_messages(candidates, header(stamp_ns, 'table'), turn)
+        for publisher, message in zip(answers, messages):
+            publisher.publish(message)
+    return node, answer, requests
+
+
+def asked(bench, node, stamp_ns, turn, timeout_s=10.0):
+    """Return the thread that asks, and the list that will hold the answer."""
+    got = []
+    thread = threading.Thread(target=lambda: got.append(
+        node.more.asker(stamp_ns, timeout_s)(some(3), turn)))
+    thread.start()
+    return thread, got
+
+
+@pytest.mark.parametrize('n', [0, 40])
+def test_the_answer_arrives_while_the_callback_waits(bench, asking, n):
+    node, answer, requests = asking
+    thread, got = asked(bench, node, 77, 1)
+    assert bench.spin(lambda: requests)
+    stamp, turn, objects = reproposal.parsed_request(requests[0].data)
+    assert (stamp, turn) == (77, 1)
+    same(objects, some(3))
+    answer(some(n, 5), 77, 1)
+    thread.join(10)
+    same(got[0], some(n, 5))
+
+
+def test_answers_to_other_questions_are_passed_over(bench, asking):
+    node, answer, requests = asking
+    answer(some(2, 1), 76, 2)
+    thread, got = asked(bench, node, 77, 2)
+    assert bench.spin(lambda: requests)
+    answer(some(2, 2), 76, 2)
+    answer(some(2, 3), 77, 1)
+    answer(some(4, 4), 77, 2)
+    thread.join(10)
+    same(got[0], some(4, 4))
+
+
+def test_silence_brings_nothing_and_is_reported(bench, asking):
+    node, answer, requests = asking
+    thread, got = asked(bench, node, 77, 1, timeout_s=0.3)
+    thread.join(10)
+    assert len(got[0]) == 0
+    assert bench.reasons(node)['parse'][0] == 'no_more_candidates'

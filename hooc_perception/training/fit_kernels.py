@@ -160,7 +160,10 @@ def grow_tree(binned, y, samples, n_classes, n_bins, n_try, node_samples, max_de
             continue
         least = max(1, min_leaf * k // n)
         best, best_feature, best_bin = min_gain * k, -1, -1
-        for t in range(min(n_try, n_features)):
+        for t in range(min(4 * n_try, n_features)):
+            # A large node must not end because its draw held nothing but noise.
+            if t >= n_try and best_feature >= 0:
+                break
             j = t + np.random.randint(0, n_features - t)
             pool[t], pool[j] = pool[j], pool[t]
             row = binned[pool[t]]

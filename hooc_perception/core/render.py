@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """The one depth renderer: training, candidates, parsing and reports all use it."""
 
-import numpy as np
-
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.kernels import raster
+import numpy as np
 
 
 def projected(vertices_world, camera):

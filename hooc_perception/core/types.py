@@ -11,9 +11,8 @@ z forward). Pixel centres have integer coordinates.
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from hooc_perception.core.geometry import matrix_from_pose
+import numpy as np
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Setting B of the paper: the true poses are put among the candidates."""
 
+from hooc_perception.evaluation.matching import posed
 from hooc_perception.evaluation.stages import as_candidates
 import numpy as np
 
@@ -16,7 +17,7 @@ def with_true_poses(truth, models):
 
     :param truth: sequence of TrueObject.
     """
-    true = as_candidates(truth, models)
+    true = as_candidates([posed(t) for t in truth], models)
 
     def change(pool):
         out = np.zeros(len(pool), bool)

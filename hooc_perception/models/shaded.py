@@ -100,7 +100,7 @@ def _pyrender():
         os.environ['PYOPENGL_PLATFORM'] = found[0]
     # pyrender 0.1.45 still says np.infty, which numpy 2 has dropped.
     if not hasattr(np, 'infty'):
-        np.inf = np.inf
+        np.infty = np.inf
     try:
         import pyrender
     except Exception as e:

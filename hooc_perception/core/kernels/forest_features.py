@@ -11,6 +11,8 @@ FREE = 12
 RADII_M = np.array([0.01, 0.02, 0.04, 0.07, 0.11, 0.16])
 RISES_M = np.array([-0.10, -0.05, -0.025, -0.01, 0.0, 0.01, 0.025, 0.05, 0.10])
 ANGLES = 12
+COS = np.cos(2 * np.pi * np.arange(ANGLES) / ANGLES)
+SIN = np.sin(2 * np.pi * np.arange(ANGLES) / ANGLES)
 AXES = 6
 BASIC = 3
 MARCHES = 24
@@ -75,16 +77,15 @@ def _height_rings(heights, origin, cell, p, out):
     for r in RADII_M:
         mean, high, low, c2, s2 = 0.0, -1e9, 1e9, 0.0, 0.0
         for a in range(ANGLES):
-            t = 2 * np.pi * a / ANGLES
-            i = int(np.floor((p[0] + r * np.cos(t) - origin[0]) / cell + 0.5))
-            j = int(np.floor((p[1] + r * np.sin(t) - origin[1]) / cell + 0.5))
+            i = int(np.floor((p[0] + r * COS[a] - origin[0]) / cell + 0.5))
+            j = int(np.floor((p[1] + r * SIN[a] - origin[1]) / cell + 0.5))
             h = 0.0
             if 0 <= i < heights.shape[0] and 0 <= j < heights.shape[1]:
                 h = heights[i, j]
             mean += h / ANGLES
             high, low = max(high, h), min(low, h)
-            c2 += h * np.cos(2 * t) / ANGLES
-            s2 += h * np.sin(2 * t) / ANGLES
+            c2 += h * (2 * COS[a] * COS[a] - 1) / ANGLES
+            s2 += h * 2 * SIN[a] * COS[a] / ANGLES
         out[o], out[o + 1], out[o + 2] = mean - p[2], high - p[2], low - p[2]
         out[o + 3] = np.sqrt(c2 * c2 + s2 * s2)
         o += 4
@@ -98,9 +99,7 @@ def _field_rings(field, origin, cell, p, out):
         for dz in RISES_M:
             solid, near = 0.0, 0.0
             for a in range(ANGLES):
-                t = 2 * np.pi * a / ANGLES
-                q = probe(field, origin, cell, p[0] + r * np.cos(t), p[1] + r * np.sin(t),
-                          p[2] + dz)
+                q = probe(field, origin, cell, p[0] + r * COS[a], p[1] + r * SIN[a], p[2] + dz)
                 solid += q <= FREE
                 near += -FREE <= q <= FREE
             out[o], out[o + 1] = solid / ANGLES, near / ANGLES

@@ -119,7 +119,7 @@ def fuse_field(depths, heights, widths, K, T_camera_world, origin, cell, shape):
     return out
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, inline='always')
 def probe(field, origin, cell, x, y, z):
     """Return the field (FIELD_UNIT_M) at a world point: free above and around, solid below."""
     k = int((z - origin[2]) / cell + 0.5)

@@ -1,0 +1,22 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""STAGE.NAME=VALUE from the command line."""
+
+from hooc_perception.errors import HoocError
+import yaml
+
+
+def overrides_of(texts):
+    """
+    Return {'stage.name': value} of STAGE.NAME=VALUE texts.
+
+    :raises HoocError: where a text has not that form.
+    """
+    found = {}
+    for text in texts:
+        key, equals, value = text.partition('=')
+        if not equals or '.' not in key:
+            raise HoocError(f'{text!r} does not set a parameter; write STAGE.NAME=VALUE, for '
+                            'instance parse.deadline_s=2.0')
+        found[key] = yaml.safe_load(value)
+    return found

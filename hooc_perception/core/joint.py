@@ -1,0 +1,67 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The energy of the `best` profile: what a set of objects leaves unexplained, in pixels.
+
+    E(S) = sum_i c_i(S) + complexity sum_k A_k + overlap sum_k v_k
+
+c_i is the cost of the object that is nearest at pixel i (kernels/explain.py: depth, normal,
+category, free space), 1 for a foreground pixel that nothing explains; A_k the pixels that object
+k covers; v_k the share of its volume inside others.
+"""
+
+from hooc_perception.core.compositor import Compositor
+from hooc_perception.core.kernels import explain as stat
+from hooc_perception.core.overlap import OverlapTerm
+import numpy as np
+
+
+class JointEnergy:
+    """
+    The joint energy over a pool; see core/compositor.py for what a search calls.
+
+    :param stats: (n, STATS) of the pool, `lists` its PixelLists.
+    """
+
+    def __init__(self, evidence, pool, stats, lists, models, config, max_instances=0):
+        """Lay the pool's pixel lists into a Compositor and compare its volumes."""
+        self.n = len(pool)
+        prior = np.zeros(self.n)
+        if self.n:
+            extents = np.array([models[c - 1].extents for c in pool.category])
+            prior = (np.log(pool.size / np.maximum(extents, 1e-9)) ** 2).sum(1)
+        unary = (config.base_cost + stats[:, stat.SHOWN]
+                 * (config.complexity + config.size_prior * prior))
+        self._images = Compositor(lists.offsets, lists.pixel, lists.depth, lists.cost,
+                                  evidence.cost_none.astype(np.float64), unary=unary,
+                                  group=pool.category, max_per_group=max_instances)
+        self._overlap = OverlapTerm(pool, models)
+        self._weight = config.overlap
+
+    @property
+    def mask(self):
+        """Return a copy of the current subset, (n,) bool."""
+        return self._images.mask
+
+    @property
+    def value(self):
+        """Return the energy of the current subset, in pixels."""
+        return self._images.value + self._weight * self._overlap.value
+
+    def deltas(self):
+        """Return (n,) float64: the change by each flip, inf where it is not allowed."""
+        return self._images.deltas() + self._weight * self._overlap.deltas()
+
+    def flip(self, k):
+        """Let candidate k join the subset, or leave it if it is in."""
+        self._images.flip(k)
+        self._overlap.flip(k)
+
+    def reset(self, mask):
+        """Start again from the subset `mask` (n,) bool."""
+        self._images.reset(mask)
+        self._overlap.reset(mask)
+
+    def evaluate(self, mask):
+        """Return the energy of the subset `mask` (n,) bool; the current one stays."""
+        return self._images.evaluate(mask) + self._weight * self._overlap.evaluate(mask)

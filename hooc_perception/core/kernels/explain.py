@@ -1,0 +1,257 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Render hypotheses into all views at once and hold them against what was measured."""
+
+from hooc_perception.core.kernels import raster
+from hooc_perception.core.kernels.hypotheses import multiply, rotation_of
+import numba as nb
+import numpy as np
+
+# Columns of the statistics of one hypothesis.
+(SHOWN, AGREE, GAIN, VIOLATE, BEHIND, MISSING, SHARE, LOG_P, COS, RESIDUAL, DELTA,
+ VIEWS) = range(12)
+STATS = 12
+
+
+@nb.njit(cache=True, inline='always')
+def posed(h, vertices, out):
+    """Write the world vertices (V, 3) of hypothesis `h` (translation, xyzw, scale) into out."""
+    R = np.empty((3, 3))
+    rotation_of(h, R)
+    for i in range(vertices.shape[0]):
+        x, y, z = vertices[i, 0] * h[7], vertices[i, 1] * h[8], vertices[i, 2] * h[9]
+        for k in range(3):
+            out[i, k] = R[k, 0] * x + R[k, 1] * y + R[k, 2] * z + h[k]
+
+
+@nb.njit(cache=True)
+def draw_faces(uvz, faces, u0, v0, depth, face):
+    """Draw a projected mesh into a window (see raster.draw), noting the face of each pixel."""
+    for f in range(faces.shape[0]):
+        raster.draw(uvz, faces[f:f + 1], f, u0, v0, depth, face)
+
+
+@nb.njit(cache=True, inline='always')
+def pixel_cost(z, d, foreground, cosine, p, tolerance, w_normal, w_class, w_free):
+    """
+    Return (cost, state) of showing depth z where d was measured.
+
+    An unexplained foreground pixel costs 1, seen table 0. State: 1 agrees, 2 seen through,
+    3 behind what is measured.
+    """
+    off = (z - d) / tolerance
+    size = min(1.0, abs(off))
+    if not foreground:
+        # Table or room was measured through the object.
+        return w_free * size, 2
+    if size >= 1.0:
+        return (1.0 if off > 0 else 0.5 + 0.5 * w_free) + 0.5 * w_class, 3 if off > 0 else 2
+    return (size + w_normal * (1.0 - max(0.0, cosine))
+            + w_class * min(1.0, -np.log(max(p, 0.002)) / 4.0)), 1
+
+
+@nb.njit(cache=True)
+def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, first, depth,
+                foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal, w_class,
+                w_free, stats, emit_at, out_pixel, out_depth, out_cost):
+    """
+    Hold one hypothesis against every view.
+
+    :param context: what is shown already: tuple of (P,) arrays owner int32, depth float32, cost
+        float32 of the nearest member and depth, cost of the next one; inf and the cost of
+        showing nothing where there is none. Only pixels where the hypothesis is nearer count.
+    :param me: the hypothesis' own number in `context`, which is looked through; -1 = none.
+    :param size: (views, 2) int64 width, height; first (views + 1,) first pixel of each view.
+    :param depth: (P,) float32 measured, NaN none; foreground (P,) bool; normals (P, 3) float32;
+        patch (P,) int32, -1 none; patch_size (patches,) pixels over all views.
+    :param p: (M, N + 1) uint8, p_row (P,) int32 row of a pixel or -1.
+    :param stats: (STATS,) float64, filled.
+    :param emit_at: -1, or where to write the pixel lists in out_*.
+    :return: number of pixels with a reading that it covers.
+    """
+    owner, depth_1, cost_1, depth_2, cost_2 = context
+    world = np.empty(vertices.shape)
+    posed(h, vertices, world)
+    stats[:] = 0.0
+    n = 0
+    touched = np.empty(64, np.int64)
+    hits = np.zeros(64)
+    n_touched = 0
+    for v in range(K.shape[0]):
+        agreed = stats[AGREE]
+        w, height = size[v, 0], size[v, 1]
+        uvz = raster.project_vertices(world, R_cw[v], t_cw[v], K[v, 0, 0], K[v, 1, 1],
+                                      K[v, 0, 2], K[v, 1, 2])
+        u0, v0, u1, v1 = raster.bounding_window(uvz, w, height)
+        if u1 <= u0 or v1 <= v0:
+            continue
+        z = np.full((v1 - v0, u1 - u0), np.inf, np.float32)
+        face = np.zeros(z.shape, np.int32)
+        draw_faces(uvz, faces, u0, v0, z, face)
+        cam = -(R_cw[v].T @ t_cw[v])
+        for y in range(v1 - v0):
+            for x in range(u1 - u0):
+                if z[y, x] == np.inf:
+                    continue
+                i = first[v] + (y + v0) * w + x + u0
+                if owner[i] == me:
+                    before, base = depth_2[i], cost_2[i]
+                else:
+                    before, base = depth_1[i], cost_1[i]
+                stats[SHOWN] += 1
+                if before < z[y, x]:
+                    stats[BEHIND] += 1
+                    continue
+                d = depth[i]
+                if not d > 0:
+                    stats[MISSING] += 1
+                    continue
+                cosine = 1.0
+                if foreground[i] and normals[i, 0] == normals[i, 0]:
+                    a, b, c = faces[face[y, x], 0], faces[face[y, x], 1], faces[face[y, x], 2]
+                    e0, e1, e2 = (world[b, 0] - world[a, 0], world[b, 1] - world[a, 1],
+                                  world[b, 2] - world[a, 2])
+                    f0, f1, f2 = (world[c, 0] - world[a, 0], world[c, 1] - world[a, 1],
+                                  world[c, 2] - world[a, 2])
+                    n0, n1, n2 = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
+                    norm = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + 1e-20
+                    # Both sides are drawn: the facing side is the one towards the camera.
+                    if (n0 * (cam[0] - world[a, 0]) + n1 * (cam[1] - world[a, 1])
+                            + n2 * (cam[2] - world[a, 2])) < 0:
+                        norm = -norm
+                    cosine = (n0 * normals[i, 0] + n1 * normals[i, 1]
+                              + n2 * normals[i, 2]) / norm
+                q = 0.0
+                if p_row[i] >= 0:
+                    q = p[p_row[i], category] / 255.0
+                cost, state = pixel_cost(z[y, x], d, foreground[i], cosine, q, tolerance,
+                                         w_normal, w_class, w_free)
+                stats[DELTA] += cost - base
+                if emit_at >= 0:
+                    out_pixel[emit_at + n] = i
+                    out_depth[emit_at + n] = z[y, x]
+                    out_cost[emit_at + n] = cost
+                n += 1
+                if state == 1:
+                    stats[AGREE] += 1
+                    stats[GAIN] += 1.0 - cost
+                    stats[COS] += cosine
+                    stats[RESIDUAL] += abs(z[y, x] - d)
+                    stats[LOG_P] += np.log(max(q, 0.002))
+                    s = patch[i]
+                    if s >= 0:
+                        for k in range(n_touched):
+                            if touched[k] == s:
+                                hits[k] += 1
+                                break
+                        else:
+                            if n_touched < 64:
+                                touched[n_touched] = s
+                                hits[n_touched] = 1
+                                n_touched += 1
+                elif state == 2:
+                    stats[VIOLATE] += cost if not foreground[i] else 1.0
+                else:
+                    stats[BEHIND] += 1
+        if stats[AGREE] > agreed:
+            stats[VIEWS] += 1
+    total = 0.0
+    for k in range(n_touched):
+        stats[SHARE] += hits[k] * min(1.0, hits[k] / patch_size[touched[k]])
+        total += hits[k]
+    if total > 0:
+        stats[SHARE] /= total
+    return n
+
+
+@nb.njit(cache=True, parallel=True)
+def explain_all(H, category, me, vertices, vertex_start, faces, face_start, context, K, R_cw,
+                t_cw, size, first, depth, foreground, normals, patch, patch_size, p, p_row,
+                tolerance, w_normal, w_class, w_free, emit_at, out_pixel, out_depth, out_cost):
+    """
+    Run explain_one for every hypothesis (m, 10).
+
+    :param category: (m,) class ids; meshes are concatenated, with faces relative to their own
+        first vertex: vertices[vertex_start[c - 1]:vertex_start[c]].
+    :param emit_at: (m,) int64, where each writes its pixel lists; -1 = not at all.
+    :return: (stats (m, STATS), n (m,)).
+    """
+    m = H.shape[0]
+    stats = np.zeros((m, STATS))
+    n = np.zeros(m, np.int64)
+    for k in nb.prange(m):
+        c = category[k]
+        n[k] = explain_one(
+            H[k], c, vertices[vertex_start[c - 1]:vertex_start[c]],
+            faces[face_start[c - 1]:face_start[c]], me[k], context, K, R_cw, t_cw, size, first,
+            depth, foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal, w_class,
+            w_free, stats[k], emit_at[k], out_pixel, out_depth, out_cost)
+    return stats, n
+
+
+@nb.njit(cache=True, parallel=True)
+def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start, context, K,
+               R_cw, t_cw, size, first, depth, foreground, normals, patch, patch_size, p, p_row,
+               tolerance, w_normal, w_class, w_free, complexity, prior, n_steps, sigma_t,
+               sigma_r, sigma_s):
+    """
+    Climb with every hypothesis (m, 10), in place, against the images: a (1+1) strategy.
+
+    What falls is the cost of the scene with the hypothesis in `context` instead of its old self
+    `me`, plus complexity x the pixels it covers, plus a prior on its scale.
+
+    :return: (m,) float64 the cost reached.
+    """
+    m = H.shape[0]
+    reached = np.zeros(m)
+    for k in nb.prange(m):
+        np.random.seed(seeds[k])
+        c = category[k]
+        V = vertices[vertex_start[c - 1]:vertex_start[c]]
+        F = faces[face_start[c - 1]:face_start[c]]
+        stats, trial, q = np.empty(STATS), np.empty(10), np.empty(4)
+        none_i, none_f = np.empty(0, np.int64), np.empty(0, np.float32)
+        step, best = 1.0, np.inf
+        for i in range(n_steps + 1):
+            trial[:] = H[k]
+            part = np.random.random()
+            if i > 0:
+                if part < 0.75:
+                    for j in range(3):
+                        trial[j] += np.random.normal() * sigma_t * step
+                if part > 0.4:
+                    for j in range(3):
+                        q[j] = np.random.normal() * sigma_r * step / 2
+                    q[3] = 1.0
+                    multiply(q, trial[3:7], trial[3:7])
+                if part > 0.6 or part < 0.2:
+                    for j in range(3):
+                        trial[7 + j] = min(2.0, max(0.45, trial[7 + j] * np.exp(
+                            np.random.normal() * sigma_s * step)))
+            explain_one(trial, c, V, F, me[k], context, K, R_cw, t_cw, size, first, depth,
+                        foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal,
+                        w_class, w_free, stats, -1, none_i, none_f, none_f)
+            a, b, d = np.log(trial[7]), np.log(trial[8]), np.log(trial[9])
+            value = stats[DELTA] + stats[SHOWN] * (
+                complexity + prior * (a * a + b * b + d * d))
+            if value < best:
+                best = value
+                H[k] = trial
+                step = min(2.0, step * 1.3)
+            else:
+                step = max(0.05, step * 0.93)
+        reached[k] = best
+    return reached
+
+
+@nb.njit(cache=True)
+def compose(members, offsets, pixel, depth, cost, owner, depth_1, cost_1, depth_2, cost_2):
+    """Write nearest and next member of every pixel into the last five arrays, see explain_one."""
+    for k in members:
+        for e in range(offsets[k], offsets[k + 1]):
+            i = pixel[e]
+            if depth[e] < depth_1[i]:
+                depth_2[i], cost_2[i] = depth_1[i], cost_1[i]
+                depth_1[i], cost_1[i], owner[i] = depth[e], cost[e], k
+            elif depth[e] < depth_2[i]:
+                depth_2[i], cost_2[i] = depth[e], cost[e]

@@ -1,0 +1,148 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Stage 4: which of the candidates stand there.
+
+`genetic` is the paper's search of Eq. 1; `joint` alternates a discrete search with continuous
+refinement of what it chose and with new proposals where depth stays unexplained.
+"""
+
+from dataclasses import dataclass, replace
+import time
+
+from hooc_perception.core.config import param
+from hooc_perception.core.eq1 import energy_of, Eq1
+from hooc_perception.core.evidence import hypotheses_of, PixelWeights
+from hooc_perception.core.genetic import genetic_search, GeneticConfig
+from hooc_perception.core.joint import JointEnergy
+from hooc_perception.core.kernels import explain as stat
+from hooc_perception.core.local_search import local_search, LocalSearchConfig
+from hooc_perception.core.propose import candidates_of
+from hooc_perception.core.types import Candidates, ParsedScene
+from hooc_perception.core.workspace import workspace_of
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ParseConfig(LocalSearchConfig, GeneticConfig):
+    """Parameters of stage 4; GeneticConfig serves `genetic`, LocalSearchConfig `joint`."""
+
+    search: str = param('joint', 'how the subset is found', choices=('joint', 'genetic'))
+    patience: int = param(15, 'kicks in a row without a gain after which the search has '
+                          'converged', low=0)
+    rounds: int = param(2, 'joint: rounds of refinement and re-proposal', low=0)
+    polish_steps: int = param(60, 'joint: steps of refinement of a chosen object', low=0)
+    tolerance_m: float = param(0.03, 'joint: depth residual as bad as no explanation', 'm',
+                               0.002, 0.5)
+    normal_weight: float = param(0.4, 'joint: cost of a perpendicular normal', '', 0.0, 2.0)
+    category_weight: float = param(0.4, 'joint: cost of a category that the classifier rules out',
+                                   '', 0.0, 4.0)
+    free_weight: float = param(0.7, 'joint: cost of hiding what was measured farther away', '',
+                               0.0, 2.0)
+    complexity: float = param(0.1, 'joint: cost of a covered pixel', '', 0.0, 2.0)
+    size_prior: float = param(0.05, 'joint: cost of squared log scale a covered pixel', '', 0, 2.0)
+    base_cost: float = param(4.0, 'joint: cost of an object, in pixels', 'px', 0.0, 1000.0)
+    overlap: float = param(300.0, 'joint: cost of an object inside others', 'px', 0.0, 1e5)
+    deadline_s: float = param(0.0, 'joint: seconds after which the best so far is the answer, '
+                              '0 = none', 's', 0.0, 3600.0, runtime=True)
+
+
+def parse(observation, probabilities, pool, models, config=ParseConfig(), rng=None,
+          max_instances=0, more=None):
+    """
+    Return the ParsedScene: the objects that together explain the frame set best.
+
+    :param pool: Candidates.
+    :param max_instances: most objects of one category, 0 = no limit.
+    :param more: callable (objects: Candidates, round: int) -> Candidates that proposes anew for
+        what the objects leave unexplained; None = the pool is all there is.
+    """
+    start = time.monotonic()
+
+    def late():
+        return 0 < config.deadline_s < time.monotonic() - start
+
+    if config.search == 'genetic':
+        scene = _genetic(observation, probabilities, pool, models, config, rng, max_instances,
+                         late)
+    else:
+        scene = _joint(observation, probabilities, pool, models, config, rng, max_instances,
+                       more, late)
+    return scene.timed(parse=time.monotonic() - start)
+
+
+def _genetic(observation, probabilities, pool, models, config, rng, max_instances, late):
+    """Search Eq. 1 as in the paper."""
+    energy = Eq1(observation, probabilities, pool, models)
+    mask, _, converged = genetic_search(len(pool), energy.evaluate, rng, config, pool.category,
+                                        max_instances, late)
+    energy.reset(mask)
+    return _answer(observation, probabilities, models, pool, mask, energy.deltas()[mask],
+                   energy.energy(mask), converged, config)
+
+
+def _joint(observation, probabilities, pool, models, config, rng, max_instances, more, late):
+    """Alternate discrete search, refinement and re-proposal."""
+    space = workspace_of(observation, probabilities, models)
+    evidence, weights = space.evidence, _weights(config)
+    stats, lists = evidence.explain(hypotheses_of(pool, models), pool.category, weights,
+                                    lists=True)
+    mask, converged = np.zeros(len(pool), bool), True
+    for turn in range(config.rounds + 1):
+        energy = JointEnergy(evidence, pool, stats, lists, models, config, max_instances)
+        energy.reset(mask)
+        found = local_search(energy, rng, config, late)
+        mask, converged = found.mask, found.converged
+        if turn == config.rounds or not converged:
+            break
+        # The refined and the unrefined stay in the pool: the search decides which fit together.
+        chosen = np.flatnonzero(mask)
+        new = Candidates.empty()
+        if len(chosen):
+            H = evidence.polish(
+                hypotheses_of(pool.take(chosen), models), pool.category[chosen], chosen,
+                evidence.compose(chosen, lists), weights, config.complexity, config.size_prior,
+                config.polish_steps, (0.005, 0.06, 0.04), rng)
+            new = candidates_of(H, pool.category[chosen], pool.score[chosen], models)
+        if more is not None:
+            new = new.extended(more(pool.take(chosen), turn + 1))
+        if len(new):
+            more_stats, more_lists = evidence.explain(hypotheses_of(new, models), new.category,
+                                                      weights, lists=True)
+            pool, lists = pool.extended(new), lists.extended(more_lists)
+            stats = np.concatenate([stats, more_stats])
+            mask = np.concatenate([mask, np.zeros(len(new), bool)])
+    worth = energy.deltas()[mask]
+    return _answer(observation, probabilities, models, pool, mask, worth, None, converged, config)
+
+
+def _answer(observation, probabilities, models, pool, mask, worth, energy, converged, config):
+    """Return the ParsedScene of a subset with its evidence."""
+    objects = pool.take(mask)
+    if energy is None:
+        energy = energy_of(observation, probabilities, objects, models)
+    n = len(objects)
+    if not n:
+        none = np.zeros(0, np.float32)
+        return ParsedScene(objects, energy, none, none, none, np.zeros(0, np.uint8), pool,
+                           converged)
+    evidence = workspace_of(observation, probabilities, models).evidence
+    H = hypotheses_of(objects, models)
+    _, lists = evidence.explain(H, objects.category, _weights(config), lists=True)
+    context = evidence.compose(np.arange(n), lists)
+    stats = evidence.explain(H, objects.category, _weights(config), context, me=np.arange(n))
+    alone = np.maximum(stats[:, stat.SHOWN], 1)
+    seen = alone - stats[:, stat.BEHIND]
+    agree = stats[:, stat.AGREE]
+    share = agree / np.maximum(agree + stats[:, stat.VIOLATE] + 20, 1)
+    objects = replace(objects, score=np.clip(share, 0, 1).astype(np.float32))
+    return ParsedScene(objects, energy, (seen / alone).astype(np.float32),
+                       (stats[:, stat.RESIDUAL] / np.maximum(agree, 1)).astype(np.float32),
+                       np.asarray(worth, np.float32), stats[:, stat.VIEWS].astype(np.uint8), pool,
+                       converged)
+
+
+def _weights(config):
+    """Return the PixelWeights of a ParseConfig."""
+    return PixelWeights(config.tolerance_m, config.normal_weight, config.category_weight,
+                        config.free_weight)

@@ -12,7 +12,6 @@ from hooc_perception.core.config import param
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe
 from hooc_perception.core.parse import parse
-from hooc_perception.core.pipeline import proposer
 from hooc_perception.core.unexplained import unexplained_points
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
@@ -46,8 +45,7 @@ class ParsingNode(StageNode):
 
     def __init__(self, **kwargs):
         """Declare parameters."""
-        super().__init__('parsing_node', ParsingConfig(), ('observe', 'propose', 'parse'),
-                         **kwargs)
+        super().__init__('parsing_node', ParsingConfig(), ('observe', 'parse'), **kwargs)
 
     def configure(self):
         """Load the generic models, build the endpoints."""
@@ -71,16 +69,9 @@ class ParsingNode(StageNode):
     def try_out(self, views, probabilities, candidates, models):
         """Parse a made-up scene."""
         observation = observe(views, self.parameters['observe'])
-        parsed = self.parsed(observation, probabilities, candidates, models)
+        parsed = parse(observation, probabilities, candidates, models, self.parameters['parse'],
+                       stage_rng(self.config.seed, 'parse'), self.max_instances)
         unexplained_points(observation, parsed.objects, models)
-
-    def parsed(self, observation, probabilities, candidates, models):
-        """Return the ParsedScene; rounds of re-proposal run in this process."""
-        seed = self.config.seed
-        return parse(observation, probabilities, candidates, models, self.parameters['parse'],
-                     stage_rng(seed, 'parse'), self.max_instances,
-                     proposer(observation, probabilities, models, self.parameters['propose'],
-                              seed))
 
     def activate(self):
         """Say what the class ids mean."""

@@ -31,7 +31,7 @@ class ClassifyConfig(Config):
     smoothing_steps: int = param(12, 'Steps by which probabilities spread over the surface '
                                  "graph, over all views; 0 = none. Never used by the paper's "
                                  'forest.', '', 0, 200)
-    smoothing_angle_rad: float = param(0.5, 'A valley of about this angle between two surface '
+    smoothing_angle_rad: float = param(0.8, 'A valley of about this angle between two surface '
                                        'points cuts the spread to 1/e.', 'rad', 0.01, 3.0)
 
 

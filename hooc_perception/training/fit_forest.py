@@ -26,7 +26,7 @@ class FitConfig(Config):
     node_samples: int = param(6000, 'Most samples that rank the features of a node; all are '
                               'then split.', '', 10, 100000000)
     max_depth: int = param(26, 'Deepest split.', '', 1, 60)
-    min_leaf: int = param(12, 'Fewest training samples in a leaf.', '', 1, 10000)
+    min_leaf: int = param(6, 'Fewest training samples in a leaf.', '', 1, 10000)
     min_gain_bits: float = param(0.005, 'Least information gain of a split.', 'bit', 0.0, 1.0)
     bins: int = param(64, 'Quantisation levels of a feature.', '', 2, 255)
     prior: float = param(0.3, "Share of a leaf's mass, in samples, that is spread as in the "

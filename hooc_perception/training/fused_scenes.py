@@ -25,8 +25,10 @@ class FusedScenesConfig(Config):
     random_rigs: float = param(0.3, 'Share of scenes seen by another rig of one to four '
                                'cameras; the others by the given one, moved a little. Some '
                                'keep the forest usable on any rig.', '', 0.0, 1.0)
-    reshape: float = param(1.0, 'How far objects depart from the generic meshes; 1 = as real '
-                           'objects do.', '', 0.0, 3.0)
+    reshape_low: float = param(0.5, 'Least departure of the objects of a scene from the generic '
+                               'meshes; 1 = as real objects do.', '', 0.0, 3.0)
+    reshape_high: float = param(1.8, 'Largest departure; scenes draw uniformly in between.', '',
+                                0.0, 3.0)
     translucent: float = param(0.08, 'Share of objects with the depth error of glass.', '', 0.0,
                                1.0)
     objects_low: int = param(8, 'Fewest objects of a scene.', '', 1, 200)
@@ -59,7 +61,7 @@ class FusedTable:
 def scene_config(config, repeats):
     """Return the TrainingConfig of a FusedScenesConfig, its rig still the given one."""
     return TrainingConfig(
-        arrangement='settled', reshape_strength=config.reshape, rig='jittered',
+        arrangement='settled', rig='jittered',
         randomise_sensor=True, translucent=config.translucent,
         scatter=ScatterConfig(objects_low=config.objects_low, objects_high=config.objects_high,
                               repeats=repeats, pose='resting'))
@@ -93,7 +95,9 @@ def _group(models, cameras, config, repeats, seed, start, stop, probes, cuts):
     for k in range(start, stop):
         rng = stage_rng(seed, 'fused scenes', k)
         rig = 'random' if rng.random() < config.random_rigs else 'jittered'
-        scene = training_scene(models, cameras, rng, replace(base, rig=rig))
+        strength = float(rng.uniform(config.reshape_low, config.reshape_high))
+        scene = training_scene(models, cameras, rng,
+                               replace(base, rig=rig, reshape_strength=strength))
         x, y = labelled_features(observe(scene.views), scene.labels, probes, rng,
                                  config.rows_sqrt)
         out.append((x if cuts is None else quantise(x, cuts), y))

@@ -76,7 +76,8 @@ def fit(binned, y, n_classes, cuts, config, rng, n_jobs=1, progress=None):
         order = np.random.default_rng(order_seed).permutation(n)[:m].astype(np.int32)
         feature, split, left = fit_kernels.grow_tree(
             binned, y, np.sort(order), n_classes, config.bins, config.features_per_node,
-            config.node_samples, config.max_depth, config.min_leaf, config.min_gain_bits, int(node_seed))
+            config.node_samples, config.max_depth, config.min_leaf, config.min_gain_bits,
+            int(node_seed))
         end = fit_kernels.walk_binned(binned, feature, split, left)
         threshold = np.zeros(len(feature), np.float32)
         inner = feature >= 0

@@ -51,6 +51,9 @@ class BagRunner:
         supervisor.bring_up([REPLAY])
         try:
             answer = self._listen(bag, began)
+            if recorder:
+                # What else is of this answer is under way.
+                supervisor.wait_a_moment(1.0)
         finally:
             if recorder:
                 recorder.close()

@@ -2,7 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Everything that stands on the table: categories and 6D poses from depth alone."""
 
+import os
+
 from hooc_perception import kernel_cache
 
-# Before the first kernel is imported: numba reads the variable only once.
+# Before the first kernel is imported: numba reads its variables only once.
 kernel_cache.choose()
+# The TBB that other libraries bring along is too old for numba, which would warn and go on.
+os.environ.setdefault('NUMBA_THREADING_LAYER_PRIORITY', 'omp workqueue tbb')

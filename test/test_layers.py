@@ -31,6 +31,8 @@ ALLOWED = {
     'ros': {'numpy', 'rclpy', 'hooc_perception.core'},
     'nodes': {'numpy', 'rclpy', 'hooc_perception.core', 'hooc_perception.ros',
               'hooc_perception.models.folder'},
+    'benchmark': {'numpy', 'scipy', 'cv2', 'open3d', 'sklearn', 'manifold3d', 'trimesh',
+                  'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.synthesis'},
     'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.scenes',
                   'hooc_perception.replay'},
     'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',

@@ -1,0 +1,150 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Contests of joint parsing: the energy, its search, the overlap of volumes."""
+
+from hooc_perception.benchmark.measure import Contest, Contestant
+from hooc_perception.benchmark.scene import candidate_meshes
+from hooc_perception.core.eq1 import D_MAX_M, Eq1
+from hooc_perception.core.genetic import genetic_search, GeneticConfig
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.local_search import local_search
+from hooc_perception.core.overlap import pairwise, union_shares
+from hooc_perception.core.render import render_depth
+from hooc_perception.models.repair import closed
+import manifold3d
+import numpy as np
+import trimesh
+
+SUBSETS = 40
+EXACT_PAIRS = 60
+GENERATIONS = 60
+
+
+def random_subsets(n, count, seed=0):
+    """Return (count, n) bool subsets of about 20 members."""
+    return stage_rng(seed, 'bench/subsets').random((count, n)) < 20 / n
+
+
+def energy_contest(scene):
+    """Return the Contest of evaluating Eq. 1 for subsets that have nothing in common."""
+    energy = Eq1(scene.observation, scene.probabilities, scene.pool, scene.models)
+    masks = random_subsets(len(scene.pool), SUBSETS)
+    few = masks[:4]
+
+    def disagreement(a, b):
+        return np.abs(a[:len(b)] - b).max()
+
+    return Contest('energy of a subset', f'{SUBSETS} subsets of about 20 of {len(scene.pool)}', (
+        Contestant('pixel lists in numba (ours)',
+                   lambda: np.array([energy.evaluate(mask) for mask in masks])),
+        Contestant('render and compare, ours and numpy',
+                   lambda: np.array([dense_energy(scene, mask) for mask in few]),
+                   len(few) / SUBSETS)),
+        disagreement, 1e-3)
+
+
+def neighbours_contest(scene):
+    """Return the Contest of evaluating all subsets that differ by one candidate."""
+    energy = Eq1(scene.observation, scene.probabilities, scene.pool, scene.models)
+    mask = random_subsets(len(scene.pool), 1)[0]
+
+    def incremental():
+        energy.reset(mask)
+        return energy.value + energy.deltas()
+
+    def afresh():
+        flips = np.eye(len(mask), dtype=bool)
+        return np.array([energy.evaluate(mask ^ flip) for flip in flips])
+
+    return Contest('energies after each flip', f'{len(mask)} neighbours of one subset', (
+        Contestant('incremental (ours)', incremental),
+        Contestant('each from scratch, in numba', afresh)),
+        lambda a, b: np.abs(a - b).max(), 1e-6)
+
+
+def search_contest(scene, seed=0):
+    """Return the Contest of searching the best subset; see `search_quality` for how well."""
+    energy = Eq1(scene.observation, scene.probabilities, scene.pool, scene.models, 1)
+    return Contest('search a subset', f'{len(scene.pool)} candidates, Eq. 1', (
+        Contestant('greedy and local search (ours)', lambda: local(energy, seed)),
+        Contestant(f"the paper's genetic algorithm, {GENERATIONS} iterations",
+                   lambda: genetic(energy, scene.pool, seed))))
+
+
+def local(energy, seed):
+    """Return the mask that greedy and iterated local search end in."""
+    energy.reset(np.zeros(energy.n, bool))
+    return local_search(energy, stage_rng(seed, 'bench/local')).mask
+
+
+def genetic(energy, pool, seed):
+    """Return the mask that the genetic algorithm ends in."""
+    return genetic_search(energy.n, energy.evaluate, stage_rng(seed, 'bench/genetic'),
+                          GeneticConfig(iterations=GENERATIONS), pool.category, 1)[0]
+
+
+def search_quality(scene, seed=0):
+    """Return {searcher: energy it reaches} on the contest's scene, and that of the truth."""
+    energy = Eq1(scene.observation, scene.probabilities, scene.pool, scene.models, 1)
+    return {'greedy and local search': float(energy.evaluate(local(energy, seed))),
+            'genetic algorithm': float(energy.evaluate(genetic(energy, scene.pool, seed))),
+            'truth': float(energy.evaluate(scene.truth))}
+
+
+def dense_energy(scene, mask):
+    """Return Eq. 1 of a subset by drawing it and comparing whole images."""
+    pool, models, probabilities = scene.pool, scene.models, scene.probabilities
+    members = np.flatnonzero(mask)
+    meshes = candidate_meshes(scene)
+    depth_cost = miss_cost = pixels = 0.0
+    for i, view in enumerate(scene.observation.views):
+        drawn, ids = render_depth([meshes[k] for k in members], view.camera)
+        read = np.isfinite(view.depth)
+        background = np.where(np.isfinite(view.background), view.background, np.inf)
+        shown = (ids >= 0) & (drawn <= background)
+        explained = np.where(shown, drawn, view.background)
+        residual = np.minimum(np.abs(explained - view.depth), D_MAX_M) / D_MAX_M
+        residual[~np.isfinite(explained)] = 0
+        p = np.zeros((*read.shape, len(models) + 1))
+        p[..., 0] = 1
+        mine = probabilities.camera == i
+        u, v = probabilities.uv[mine].T
+        p[v, u] = probabilities.p[mine] / 255
+        classes = np.where(shown, pool.category[members][ids] if len(members) else 0, 0)
+        miss = 1 - np.take_along_axis(p, classes[..., None].astype(int), axis=2)[..., 0]
+        depth_cost += residual[read].sum()
+        miss_cost += miss[read].sum()
+        pixels += read.sum()
+    overlap = union_shares(pool.take(members), models).mean() if len(members) else 0.0
+    return (depth_cost + miss_cost) / pixels + overlap
+
+
+def overlap_contest(scene):
+    """Return the Contest of the volumes that pairs of candidates share."""
+    pool, models = scene.pool, scene.models
+    shares = pairwise(pool, models)
+    i, j = np.nonzero(np.triu(shares, 1) > 0.02)
+    chosen = stage_rng(0, 'bench/pairs').permutation(len(i))[:EXACT_PAIRS]
+    i, j = i[chosen], j[chosen]
+    solids = {k: _solid(pool, models, k) for k in np.union1d(i, j)}
+
+    def exact():
+        return np.array([(solids[a] ^ solids[b]).volume() / solids[a].volume()
+                         for a, b in zip(i, j)])
+
+    n = len(pool) * (len(pool) - 1) // 2
+    return Contest('overlap of volumes', f'{n} pairs of candidates', (
+        Contestant('interior samples in numba (ours)', lambda: pairwise(pool, models)[i, j]),
+        Contestant('manifold3d, exact (only pairs that overlap)', exact,
+                   len(i) / max(int((np.triu(shares, 1) > 0.02).sum()), 1))),
+        lambda a, b: np.abs(a - b).mean(), 0.05)
+
+
+def _solid(pool, models, k):
+    """Return the manifold3d solid of a candidate."""
+    model = models[pool.category[k] - 1]
+    mesh = closed(trimesh.Trimesh(model.vertices, model.faces, process=False))
+    vertices = np.asarray(mesh.vertices) * (pool.size[k] / model.extents)
+    world = trimesh.transform_points(vertices, pool.T_world_model(k))
+    return manifold3d.Manifold(manifold3d.Mesh(world.astype(np.float32),
+                                               np.asarray(mesh.faces, np.uint32)))

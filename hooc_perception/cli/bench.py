@@ -1,0 +1,85 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`hooc bench`: speed and memory of the stages beside named baselines, in one run."""
+
+import json
+from pathlib import Path
+
+from hooc_perception.errors import HoocError
+
+HELP = ('Measure the stages of the chain beside named baselines on one synthetic scene of 20 '
+        'objects, in one run, and print the times as ratios. Contestants must agree on the '
+        'result. Ratios compare across machines, times do not.')
+
+
+def add_arguments(parser):
+    """Declare the arguments."""
+    parser.add_argument('--stage', action='append', default=[], metavar='NAME',
+                        help='only stages whose name contains this (repeatable)')
+    parser.add_argument('--json', type=Path, metavar='FILE', help='write all figures as JSON')
+    parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
+
+
+def run(args):
+    """Run the command; return the exit code."""
+    from hooc_perception.benchmark import learning, parsing, rendering
+    from hooc_perception.benchmark.measure import hold
+    from hooc_perception.benchmark.scene import bench_scene
+    from tqdm import tqdm
+    contests = {
+        'undistort an image': rendering.undistortion_contest,
+        'render a view': rendering.view_contest,
+        'render the candidates': rendering.candidates_contest,
+        'classify pixels': lambda scene: learning.forest_contest(args.seed),
+        'align by ICP': lambda scene: learning.icp_contest(scene, args.seed),
+        'energy of a subset': parsing.energy_contest,
+        'energies after each flip': parsing.neighbours_contest,
+        'overlap of volumes': parsing.overlap_contest,
+        'search a subset': lambda scene: parsing.search_contest(scene, args.seed),
+    }
+    chosen = {name: make for name, make in contests.items()
+              if not args.stage or any(part in name for part in args.stage)}
+    if not chosen:
+        raise HoocError(f'no stage is called {" or ".join(args.stage)}; there are '
+                        f'{", ".join(contests)}')
+    scene = bench_scene(args.seed)
+    entries = [entry for name, make in tqdm(chosen.items(), desc='stages', disable=None)
+               for entry in hold(make(scene))]
+    quality = (parsing.search_quality(scene, args.seed) if 'search a subset' in chosen else {})
+    _print(entries, quality)
+    if args.json:
+        args.json.parent.mkdir(parents=True, exist_ok=True)
+        args.json.write_text(json.dumps(_content(entries, quality, args.seed), indent=1) + '\n')
+        print(args.json)
+
+
+def _print(entries, quality):
+    """Print the table and what the searches reach."""
+    from hooc_perception.evaluation.tables import Table, to_text
+    rows, stage = [], None
+    for e in entries:
+        if e.stage != stage:
+            rows.append((f'{e.stage}: {e.work}', None, None, None))
+            stage = e.stage
+        rows.append((f'  {e.name}', f'{1000 * e.seconds:.4g}', f'{e.ratio:.3g} x',
+                     f'{e.peak_mb:.3g}' if e.peak_mb == e.peak_mb else None))
+    notes = ['', 'Median wall time of repeated runs after one that warms up. The ratio is how',
+             'many times faster than the last line of its group. MB is the peak of what Python',
+             'and numpy ask for; the native memory of other libraries is not in it.']
+    if quality:
+        notes.append('Eq. 1 reached: ' + ', '.join(
+            f'{name} {value:.4f}' for name, value in quality.items()) + '.')
+    print(to_text(Table('Stages beside baselines', ('', 'ms', 'ratio', 'MB'), tuple(rows),
+                        tuple(notes))))
+
+
+def _content(entries, quality, seed):
+    """Return what the JSON file holds."""
+    import os
+    import platform
+    finite = {True: lambda x: x, False: lambda x: None}
+    return {'format': 'hooc-bench/1', 'seed': seed, 'search_energy': quality,
+            'machine': {'processor': platform.machine(), 'cores': os.cpu_count(),
+                        'python': platform.python_version()},
+            'entries': [{key: finite[value == value](value) for key, value in vars(e).items()}
+                        for e in entries]}

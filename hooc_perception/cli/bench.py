@@ -16,6 +16,8 @@ def add_arguments(parser):
     """Declare the arguments."""
     parser.add_argument('--stage', action='append', default=[], metavar='NAME',
                         help='only stages whose name contains this (repeatable)')
+    parser.add_argument('--model', type=Path, metavar='MODEL',
+                        help='time the whole chain with this model, too, stage by stage')
     parser.add_argument('--json', type=Path, metavar='FILE', help='write all figures as JSON')
     parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
 
@@ -42,14 +44,24 @@ def run(args):
     if not chosen:
         raise HoocError(f'no stage is called {" or ".join(args.stage)}; there are '
                         f'{", ".join(contests)}')
+    folder = None
+    if args.model:      # a model that cannot be read is better refused before minutes of work
+        from hooc_perception.models.folder import load_model_folder
+        folder = load_model_folder(args.model)
     scene = bench_scene(args.seed)
     entries = [entry for name, make in tqdm(chosen.items(), desc='stages', disable=None)
                for entry in hold(make(scene))]
     quality = (parsing.search_quality(scene, args.seed) if 'search a subset' in chosen else {})
     _print(entries, quality)
+    times = None
+    if folder:
+        from hooc_perception.benchmark.chain import chain_times
+        times = chain_times(folder, scene)
+        _print_chain(times)
     if args.json:
         args.json.parent.mkdir(parents=True, exist_ok=True)
-        args.json.write_text(json.dumps(_content(entries, quality, args.seed), indent=1) + '\n')
+        content = _content(entries, quality, times, args.seed)
+        args.json.write_text(json.dumps(content, indent=1) + '\n')
         print(args.json)
 
 
@@ -73,12 +85,26 @@ def _print(entries, quality):
                         tuple(notes))))
 
 
-def _content(entries, quality, seed):
+def _print_chain(times):
+    """Print where the time of the whole chain goes."""
+    from hooc_perception.evaluation.tables import Table, to_text
+    total = sum(times.seconds.values())
+    rows = [(stage, f'{seconds:.3f}', f'{seconds / total:.0%}')
+            for stage, seconds in times.seconds.items()]
+    print('\n' + to_text(Table(
+        f'The chain, profile {times.profile}', ('stage', 's', 'share'),
+        (*rows, ('all', f'{total:.3f}', None)),
+        (f'{times.candidates} candidates, {times.objects} objects; the process needed '
+         f'{times.peak_mb:.0f} MB at most.',), bold=(len(rows),))))
+
+
+def _content(entries, quality, times, seed):
     """Return what the JSON file holds."""
     import os
     import platform
     finite = {True: lambda x: x, False: lambda x: None}
     return {'format': 'hooc-bench/1', 'seed': seed, 'search_energy': quality,
+            'chain': vars(times) if times else None,
             'machine': {'processor': platform.machine(), 'cores': os.cpu_count(),
                         'python': platform.python_version()},
             'entries': [{key: finite[value == value](value) for key, value in vars(e).items()}

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc demo`: the bundled scene through the five nodes, beside the truth."""
 
-from argparse import Namespace
+from argparse import ArgumentParser
 from dataclasses import replace
 from pathlib import Path
 import shutil
@@ -24,7 +24,7 @@ def add_arguments(parser):
                         help='folder for the results and the report (default: %(default)s)')
     parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
                         help='default: the one the bundled model was trained for')
-    parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
+    parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--timeout', type=float, default=300.0, metavar='S',
                         help='how long the scene may take (default: %(default)g s)')
     parser.add_argument('--verbose', action='store_true', help='show all that the nodes log')
@@ -45,14 +45,24 @@ def run(args):
     from hooc_perception.scenes.results import load_results
     results = args.out / 'results.json'
     args.out.mkdir(parents=True, exist_ok=True)
-    run_command.run(Namespace(
-        bags=[root / SCENE], model=root / MODEL, out=results, profile=args.profile,
-        seed=args.seed, report=args.out, timeout=args.timeout, params=None,
-        verbose=args.verbose))
+    run_command.run(_run_arguments(args, root, results))
     models = {model.name: model for model in load_model_folder(root / MODEL).models}
     entry = load_results(results)['scenes'][0]
     print('\n' + to_text(comparison(entry, BagScene(root / SCENE).truth, models)))
     print(f'\nresults: {results.resolve()}\nreport:  {(args.out / "report.html").resolve()}')
+
+
+def _run_arguments(args, root, results):
+    """Return the arguments of `hooc run` for the bundle, with its own defaults."""
+    from hooc_perception.cli import run as run_command
+    parser = ArgumentParser()
+    run_command.add_arguments(parser)
+    words = [root / SCENE, '--model', root / MODEL, '--out', results, '--report', args.out,
+             '--timeout', args.timeout]
+    words += ['--seed', args.seed] if args.seed is not None else []
+    words += ['--profile', args.profile] if args.profile else []
+    words += ['--verbose'] if args.verbose else []
+    return parser.parse_args([str(word) for word in words])
 
 
 def bundle_root(must_exist=True):

@@ -21,7 +21,7 @@ GROUP = 4
 class FusedScenesConfig(Config):
     """How many scenes the fused forest sees, of what kind, and what is kept of each."""
 
-    scenes: int = param(600, 'Synthetic scenes.', '', 8, 100000)
+    scenes: int = param(800, 'Synthetic scenes.', '', 8, 100000)
     random_rigs: float = param(0.3, 'Share of scenes seen by another rig of one to four '
                                'cameras; the others by the given one, moved a little. Some '
                                'keep the forest usable on any rig.', '', 0.0, 1.0)
@@ -33,9 +33,9 @@ class FusedScenesConfig(Config):
                                1.0)
     objects_low: int = param(8, 'Fewest objects of a scene.', '', 1, 200)
     objects_high: int = param(20, 'Most objects of a scene.', '', 1, 200)
-    rows_sqrt: float = param(2.5, 'Pixels kept of a class with n foreground pixels in a scene: '
-                             'this times sqrt(n). Large objects would drown the small ones.',
-                             '', 0.1, 100.0)
+    rows_sqrt: float = param(1.2, 'Pixels kept of a class with n foreground pixels in a scene: '
+                             'this times sqrt(n). Large objects would drown the small ones; '
+                             'more scenes teach more than more pixels of each.', '', 0.1, 100.0)
     probes: int = param(192, 'Random points of the fused field that a pixel reads.', '', 0, 5000)
     quantile_scenes: int = param(24, 'First scenes that set the quantisation of the features.',
                                  '', 4, 1000)

@@ -29,7 +29,7 @@ from tqdm import tqdm
 PROFILES = {
     'paper': (fit_pixels.PixelFitConfig(),),
     'best': (FusedScenesConfig(), FitConfig()),
-    'fast': (FusedScenesConfig(scenes=200), FitConfig(trees=24)),
+    'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24)),
 }
 
 

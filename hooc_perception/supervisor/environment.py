@@ -14,6 +14,7 @@ from hooc_perception.ros.spin import PARENT_VARIABLE
 
 FAST_DDS_PROFILE = Path(__file__).with_name('fast_dds.xml')
 FAST_DDS_VARIABLES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
+TRANSPORTS_VARIABLE = 'FASTDDS_BUILTIN_TRANSPORTS'
 SHARED_MEMORY = Path('/dev/shm')
 SEGMENT_BYTES = 64 * 2 ** 20
 # Domains above would use ports that the system gives to outgoing connections.
@@ -63,11 +64,12 @@ def use_large_segments(processes=8):
     Have Fast DDS use shared-memory segments that hold several images, where there is room.
 
     :param processes: how many such segments there will be.
-    :return: whether the profile is in use. Not where the user has one of their own, nor where
-        shared memory is too small (containers often have 64 MB): writing to a segment
-        without room behind it would kill the process.
+    :return: whether the profile is in use. Not where the user has one of their own or has
+        chosen transports by FASTDDS_BUILTIN_TRANSPORTS, nor where shared memory is too small
+        (containers often have 64 MB): writing to a segment without room behind it would kill
+        the process.
     """
-    if any(os.environ.get(name) for name in FAST_DDS_VARIABLES):
+    if any(os.environ.get(name) for name in (*FAST_DDS_VARIABLES, TRANSPORTS_VARIABLE)):
         return False
     if not SHARED_MEMORY.is_dir() or (
             shutil.disk_usage(SHARED_MEMORY).free < 1.25 * processes * SEGMENT_BYTES):

@@ -106,9 +106,12 @@ class Supervisor:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         for name in self.names:
-            client = self._client(name, ChangeState, 'change_state')
-            self.wait(client.service_is_ready, START_TIMEOUT_S,
-                      f'{name} does not answer {START_TIMEOUT_S:g} s after its start')
+            complaint = f'{name} does not answer {START_TIMEOUT_S:g} s after its start'
+            client = self._client(name, GetState, 'get_state')
+            self.wait(client.service_is_ready, START_TIMEOUT_S, complaint)
+            # Services are there before the parameters are declared; an answer comes only from
+            # a node that has accepted all of them.
+            self.wait(client.call_async(GetState.Request()).done, START_TIMEOUT_S, complaint)
 
     # Talking to the nodes.
 

@@ -47,14 +47,21 @@ def gone(pids, timeout_s=15.0):
 def quiet_domain(monkeypatch):
     """Keep what `isolate` puts into the environment from leaking into other tests."""
     for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE',
-                 *environment.FAST_DDS_VARIABLES):
+                 environment.TRANSPORTS_VARIABLE, *environment.FAST_DDS_VARIABLES):
         monkeypatch.delenv(name, raising=False)
         monkeypatch.setenv(name, '')
         monkeypatch.delenv(name)
 
 
+def without_shared_memory(monkeypatch):
+    """Who is killed cannot remove its shared memory, and LOCALHOST insists on some."""
+    monkeypatch.setenv(environment.TRANSPORTS_VARIABLE, 'UDPv4')
+    monkeypatch.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+
+
 @pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_nothing_is_left_behind(number):
+def test_nothing_is_left_behind(number, monkeypatch):
+    without_shared_memory(monkeypatch)
     if sys.platform != 'linux':
         pytest.skip('reads /proc')
     parent = subprocess.Popen([sys.executable, '-c', PARENT], stdout=subprocess.PIPE, text=True,
@@ -67,7 +74,8 @@ def test_nothing_is_left_behind(number):
     assert gone(pids) == []
 
 
-def test_a_death_is_noticed_and_named():
+def test_a_death_is_noticed_and_named(monkeypatch):
+    without_shared_memory(monkeypatch)
     with Supervisor(('replay_node',), isolated=True) as supervisor:
         process = supervisor.processes['replay_node']
         os.kill(process.pid, signal.SIGKILL)

@@ -34,13 +34,13 @@ def energy_contest(scene):
     def disagreement(a, b):
         return np.abs(a[:len(b)] - b).max()
 
-    return Contest('energy of a subset', f'{SUBSETS} subsets of about 20 of {len(scene.pool)}', (
-        Contestant('pixel lists in numba (ours)',
-                   lambda: np.array([energy.evaluate(mask) for mask in masks])),
-        Contestant('render and compare, ours and numpy',
-                   lambda: np.array([dense_energy(scene, mask) for mask in few]),
-                   len(few) / SUBSETS)),
-        disagreement, 1e-3)
+    ours = Contestant('pixel lists in numba (ours)',
+                      lambda: np.array([energy.evaluate(mask) for mask in masks]))
+    dense = Contestant('render and compare, numba and numpy',
+                       lambda: np.array([dense_energy(scene, mask) for mask in few]),
+                       len(few) / SUBSETS)
+    return Contest('energy of a subset', f'{SUBSETS} subsets of about 20 of {len(scene.pool)}',
+                   (ours, dense), disagreement, 1e-3)
 
 
 def neighbours_contest(scene):
@@ -133,11 +133,11 @@ def overlap_contest(scene):
                          for a, b in zip(i, j)])
 
     n = len(pool) * (len(pool) - 1) // 2
-    return Contest('overlap of volumes', f'{n} pairs of candidates', (
-        Contestant('interior samples in numba (ours)', lambda: pairwise(pool, models)[i, j]),
-        Contestant('manifold3d, exact (only pairs that overlap)', exact,
-                   len(i) / max(int((np.triu(shares, 1) > 0.02).sum()), 1))),
-        lambda a, b: np.abs(a - b).mean(), 0.05)
+    ours = Contestant('interior samples in numba (ours)', lambda: pairwise(pool, models)[i, j])
+    manifold = Contestant('manifold3d, exact (only pairs that overlap)', exact,
+                          len(i) / max(int((np.triu(shares, 1) > 0.02).sum()), 1))
+    return Contest('overlap of volumes', f'{n} pairs of candidates', (ours, manifold),
+                   lambda a, b: np.abs(a - b).mean(), 0.05)
 
 
 def _solid(pool, models, k):

@@ -1,14 +1,24 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Small rendered scenes for the tests of classification."""
+"""Small rendered scenes for the tests of the stages."""
 
 from types import SimpleNamespace
 
-from hooc_perception.core.observe import observe
+from hooc_perception.core.geometry import posed_vertices
+from hooc_perception.core.observe import observe, rectify
 from hooc_perception.core.render import render_depth
-from hooc_perception.core.types import Camera, RectifiedView
+from hooc_perception.core.types import (
+    Camera,
+    Candidates,
+    DepthView,
+    PixelProbabilities,
+    RectifiedView,
+)
+from hooc_perception.models.derive import derive
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+import trimesh
 
 BOX_FACES = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
                       [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]], np.int32)
@@ -70,3 +80,79 @@ def observed(meshes, cameras=None):
 def small():
     """Return the functions above: importlib mode lets test modules share nothing else."""
     return SimpleNamespace(box=box, rig=rig, views_of=views_of, observed=observed)
+
+
+THINGS = {'box': trimesh.creation.box((0.14, 0.10, 0.06)),
+          'ball': trimesh.creation.icosphere(3, 0.04),
+          'can': trimesh.creation.cylinder(0.03, 0.12, sections=32)}
+
+
+def desk_with(models, truth, seed=0):
+    """
+    Return a desk with the objects `truth` (Candidates), seen by three small noisy cameras.
+
+    The depth has 1 mm of noise, 1 % of holes and whole millimetres. Fields: models (class ids
+    1 box, 2 ball, 3 can), cameras, truth, meshes (posed), clean (depth, inf = none), classes
+    ((H, W), 0 none) and views (raw DepthView) of each camera, observation, probabilities
+    (from the true classes, sure but not certain).
+    """
+    rng = np.random.default_rng(seed)
+    cameras = tuple(camera(f'camera{i}', 0.3 + 2 * np.pi * i / 3, 0.75, 0.75, height=120,
+                           focal=190.0) for i in range(3))
+    meshes = [(posed_vertices(models[truth.category[i] - 1], truth.translation[i],
+                              truth.rotation_xyzw[i], truth.size[i]),
+               models[truth.category[i] - 1].faces) for i in range(len(truth))]
+    clean, classes, views = [], [], []
+    for c in cameras:
+        depth, ids = render_depth([*meshes, table()], c)
+        clean.append(depth)
+        classes.append(np.append(truth.category, 0)[np.maximum(ids, -1)] * (ids >= 0))
+        noisy = np.round(depth + rng.normal(0, 0.001, depth.shape), 3)
+        noisy[~np.isfinite(depth) | (rng.random(depth.shape) < 0.01)] = np.nan
+        views.append(DepthView(c, noisy.astype(np.float32)))
+    observation = observe([rectify(v) for v in views])
+    return SimpleNamespace(
+        models=models, cameras=cameras, truth=truth, meshes=meshes, clean=clean,
+        classes=classes, views=tuple(views), observation=observation,
+        probabilities=probabilities_of(observation, classes, len(models)))
+
+
+def probabilities_of(observation, classes, n_models):
+    """Return the PixelProbabilities of a classifier that knows the (H, W) true classes."""
+    camera_index, uv, p = [], [], []
+    for k, view in enumerate(observation.views):
+        rows, columns = np.nonzero(view.foreground)
+        row = np.full((len(rows), n_models + 1), 10, np.uint8)
+        row[np.arange(len(rows)), classes[k][rows, columns]] = 255 - 10 * n_models
+        camera_index.append(np.full(len(rows), k, np.uint8))
+        uv.append(np.column_stack([columns, rows]).astype(np.uint16))
+        p.append(row)
+    return PixelProbabilities(*(np.concatenate(x) for x in (camera_index, uv, p)))
+
+
+@pytest.fixture(scope='session')
+def things():
+    """Return the GenericModels of a box, a ball and a can."""
+    return tuple(derive(name, mesh, np.random.default_rng(0)) for name, mesh in THINGS.items())
+
+
+@pytest.fixture(scope='session')
+def desk(things):
+    """Return a desk with one of each, apart from each other; see `desk_with`."""
+    return desk_with(things, Candidates(
+        np.array([1, 2, 3], np.uint16),
+        np.array([[-0.08, 0.05, 0.03], [0.09, 0.06, 0.04], [0.02, -0.10, 0.06]]),
+        Rotation.from_rotvec([[0, 0, 0.4], [0, 0, 0], [0, 0, 0]]).as_quat(),
+        np.array([m.extents for m in things], np.float32), np.ones(3, np.float32)))
+
+
+@pytest.fixture(scope='session')
+def empty_desk(things):
+    """Return a desk on which nothing stands."""
+    return desk_with(things, Candidates.empty())
+
+
+@pytest.fixture(scope='session')
+def make_desk(things):
+    """Return a function: Candidates -> desk with them."""
+    return lambda truth, seed=0: desk_with(things, truth, seed)

@@ -72,10 +72,9 @@ def bundle_root(must_exist=True):
     :raises HoocError: where neither holds them and `must_exist`.
     """
     source = Path(__file__).resolve().parents[2]
-    places = [source, Path(sys.prefix) / 'share' / 'hooc_perception',
-              # colcon installs into <prefix>/lib/python3.x/site-packages
-              source.parents[2] / 'share' / 'hooc_perception']
-    for place in places:
+    # colcon installs into <prefix>/lib/python3.x/site-packages
+    prefixes = [Path(sys.prefix), *list(source.parents)[2:3]]
+    for place in [source, *(prefix / 'share' / 'hooc_perception' for prefix in prefixes)]:
         if (place / SCENE / 'metadata.yaml').is_file() and (place / MODEL).is_dir():
             return place
     if must_exist:

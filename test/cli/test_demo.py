@@ -44,6 +44,25 @@ def test_without_a_bundle_the_mend_is_named(monkeypatch, tmp_path, capsys):
     assert 'make bundle' in capsys.readouterr().err
 
 
+@pytest.mark.parametrize('package, share', [
+    ('hooc_perception', '.'), ('lib/python3.11/site-packages/hooc_perception',
+                               'share/hooc_perception')])
+def test_the_bundle_is_found_in_a_source_tree_and_where_colcon_installs(
+        monkeypatch, tmp_path, package, share):
+    monkeypatch.setattr(demo, '__file__', str(tmp_path / package / 'cli/demo.py'))
+    monkeypatch.setattr(demo.sys, 'prefix', str(tmp_path / 'elsewhere'))
+    (tmp_path / share / demo.SCENE).mkdir(parents=True)
+    (tmp_path / share / demo.SCENE / 'metadata.yaml').touch()
+    (tmp_path / share / demo.MODEL).mkdir(parents=True)
+    assert demo.bundle_root().resolve() == (tmp_path / share).resolve()
+
+
+def test_a_shallow_source_tree_is_no_trouble(monkeypatch):
+    monkeypatch.setattr(demo, '__file__', '/nowhere/hooc_perception/cli/demo.py')
+    with pytest.raises(HoocError, match='make bundle'):
+        demo.bundle_root()
+
+
 @pytest.fixture(scope='module')
 def bundle():
     """Return the source tree where it holds the bundle."""

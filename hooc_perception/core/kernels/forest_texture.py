@@ -10,25 +10,42 @@ TEXTURE_FEATURES = 7 * len(REACHES)
 
 
 @nb.njit(cache=True)
-def _diffuse(values, pairs, weight, steps):
+def _neighbours(m, pairs, weight):
+    """Return (start (m + 1,), other, w): the graph as neighbour lists, in the edges' order."""
+    start = np.zeros(m + 1, np.int64)
+    for e in range(pairs.shape[0]):
+        start[pairs[e, 0] + 1] += 1
+        start[pairs[e, 1] + 1] += 1
+    start = np.cumsum(start)
+    fill = start[:-1].copy()
+    other = np.empty(2 * pairs.shape[0], np.int32)
+    w = np.empty(2 * pairs.shape[0], np.float32)
+    for e in range(pairs.shape[0]):
+        a, b = pairs[e, 0], pairs[e, 1]
+        other[fill[a]], w[fill[a]] = b, weight[e]
+        other[fill[b]], w[fill[b]] = a, weight[e]
+        fill[a] += 1
+        fill[b] += 1
+    return start, other, w
+
+
+@nb.njit(cache=True, parallel=True)
+def _diffuse(values, start, other, w, steps):
     """Return (m, C) after `steps` of averaging over the weighted graph, own weight 1."""
     m, n = values.shape
-    now = values.copy()
-    new = np.empty_like(now)
-    total = np.ones(m)
-    for e in range(pairs.shape[0]):
-        total[pairs[e, 0]] += weight[e]
-        total[pairs[e, 1]] += weight[e]
+    now, new = values.copy(), np.empty_like(values)
     for _ in range(steps):
-        new[:] = now
-        for e in range(pairs.shape[0]):
-            a, b, w = pairs[e, 0], pairs[e, 1], weight[e]
+        for i in nb.prange(m):
+            total = np.float32(1.0)
             for c in range(n):
-                new[a, c] += w * now[b, c]
-                new[b, c] += w * now[a, c]
-        for i in range(m):
+                new[i, c] = now[i, c]
+            for k in range(start[i], start[i + 1]):
+                total += w[k]
+                for c in range(n):
+                    new[i, c] += w[k] * now[other[k], c]
             for c in range(n):
-                now[i, c] = new[i, c] / total[i]
+                new[i, c] /= total
+        now, new = new, now
     return now
 
 
@@ -47,6 +64,15 @@ def normal_shape(tensor, out):
     values, vectors = np.linalg.eigh(a)
     out[0], out[1] = values[0], values[1]
     out[2], out[3] = abs(vectors[2, 0]), abs(vectors[2, 2])
+
+
+@nb.njit(cache=True, parallel=True)
+def _describe(moments, out):
+    """Fill (m, 7): `normal_shape` of the first six columns, then the other three."""
+    for i in nb.prange(moments.shape[0]):
+        normal_shape(moments[i, :6], out[i, :4])
+        for k in range(3):
+            out[i, 4 + k] = moments[i, 6 + k]
 
 
 @nb.njit(cache=True)
@@ -80,12 +106,10 @@ def textures(points, normals, pairs, weight):
         for k in range(6, 9):
             raw[i, k] /= degree[i]
     out = np.empty((m, TEXTURE_FEATURES), np.float32)
-    now, done = raw, 0
+    start, other, w = _neighbours(m, pairs, weight)
+    now, done = raw.astype(np.float32), 0
     for r in range(len(REACHES)):
-        now = _diffuse(now, pairs, weight, REACHES[r] - done)
+        now = _diffuse(now, start, other, w, REACHES[r] - done)
         done = REACHES[r]
-        for i in range(m):
-            normal_shape(now[i, :6], out[i, 7 * r:7 * r + 4])
-            for k in range(3):
-                out[i, 7 * r + 4 + k] = now[i, 6 + k]
+        _describe(now, out[:, 7 * r:7 * r + 7])
     return out

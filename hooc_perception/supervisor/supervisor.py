@@ -24,6 +24,13 @@ START_TIMEOUT_S = 60.0
 # Loading a model and compiling for the first time take long on a small machine.
 TRANSITION_TIMEOUT_S = 300.0
 SET_TIMEOUT_S = 10.0
+RETRY_S = 3.0
+_SERVICES = {GetState: 'get_state', ChangeState: 'change_state',
+             SetParametersAtomically: 'set_parameters_atomically'}
+_GOALS = {Transition.TRANSITION_CONFIGURE: State.PRIMARY_STATE_INACTIVE,
+          Transition.TRANSITION_ACTIVATE: State.PRIMARY_STATE_ACTIVE,
+          Transition.TRANSITION_DEACTIVATE: State.PRIMARY_STATE_INACTIVE,
+          Transition.TRANSITION_CLEANUP: State.PRIMARY_STATE_UNCONFIGURED}
 
 
 class Supervisor:
@@ -106,12 +113,16 @@ class Supervisor:
         self._executor = SingleThreadedExecutor(context=self._context)
         self._executor.add_node(self.node)
         for name in self.names:
+            # All clients at once: they find their services while the nodes start.
+            for kind, service in _SERVICES.items():
+                self._clients[name, kind] = self.node.create_client(kind, f'{name}/{service}')
+        for name in self.names:
             complaint = f'{name} does not answer {START_TIMEOUT_S:g} s after its start'
-            client = self._client(name, GetState, 'get_state')
-            self.wait(client.service_is_ready, START_TIMEOUT_S, complaint)
+            for kind in _SERVICES:
+                self.wait(self._clients[name, kind].service_is_ready, START_TIMEOUT_S, complaint)
             # Services are there before the parameters are declared; an answer comes only from
             # a node that has accepted all of them.
-            self.wait(client.call_async(GetState.Request()).done, START_TIMEOUT_S, complaint)
+            self.state(name, START_TIMEOUT_S, complaint)
 
     # Talking to the nodes.
 
@@ -161,45 +172,72 @@ class Supervisor:
     def change(self, names, transition, done):
         """Have nodes make one lifecycle transition; HoocError with the reason of the first."""
         request = ChangeState.Request(transition=Transition(id=transition))
-        futures = {name: self._client(name, ChangeState, 'change_state').call_async(request)
-                   for name in names}
+        futures = {name: self._clients[name, ChangeState].call_async(request) for name in names}
         for name, future in futures.items():
-            self.wait(future.done, TRANSITION_TIMEOUT_S,
-                      f'{name} could not be {done} within {TRANSITION_TIMEOUT_S:g} s')
-            if not future.result().success:
+            if not self._changed(name, request, future, done):
                 # The reason comes through a pipe and may be a moment behind.
                 self.wait_a_moment()
                 raise HoocError(f'{name} could not be {done}: '
                                 f'{self.processes[name].last_words()}')
 
-    def state(self, name):
+    def _changed(self, name, request, future, done):
+        """
+        Wait for a transition to end; return whether it succeeded.
+
+        A service's answer is lost where the node had not found the client yet. Asking again is
+        no harm for other calls; here the node's state tells first whether it is needed.
+        """
+        goal = _GOALS[request.transition.id]
+        complaint = f'{name} could not be {done} within {TRANSITION_TIMEOUT_S:g} s'
+        deadline = time.monotonic() + TRANSITION_TIMEOUT_S
+        while time.monotonic() < deadline:
+            asked = time.monotonic()
+            self.wait(lambda: future.done() or time.monotonic() - asked > RETRY_S,
+                      TRANSITION_TIMEOUT_S, complaint)
+            if future.done():
+                return future.result().success
+            # A node answers this only when it is through with the transition.
+            state = self.state(name, TRANSITION_TIMEOUT_S, complaint)
+            self.wait_a_moment()
+            if future.done():
+                return future.result().success
+            if state == goal:
+                return True
+            future = self._clients[name, ChangeState].call_async(request)
+        raise HoocError(complaint)
+
+    def state(self, name, timeout_s=SET_TIMEOUT_S, complaint=None):
         """Return the lifecycle state's id of a node."""
-        future = self._client(name, GetState, 'get_state').call_async(GetState.Request())
-        self.wait(future.done, SET_TIMEOUT_S, f'{name} does not answer')
-        return future.result().current_state.id
+        return self._ask(name, GetState, GetState.Request(), timeout_s,
+                         complaint or f'{name} does not answer').current_state.id
 
     def set_parameters(self, name, values):
         """Set parameters of one node, all or none; HoocError with the node's reason."""
-        client = self._client(name, SetParametersAtomically, 'set_parameters_atomically')
         request = SetParametersAtomically.Request(
             parameters=[parameter_message(*item) for item in values.items()])
-        self.wait(client.service_is_ready, SET_TIMEOUT_S, f'{name} does not answer')
-        future = client.call_async(request)
-        self.wait(future.done, SET_TIMEOUT_S, f'{name} does not answer')
-        if not future.result().result.successful:
-            raise HoocError(f'{name}: {future.result().result.reason}')
+        result = self._ask(name, SetParametersAtomically, request, SET_TIMEOUT_S,
+                           f'{name} does not answer').result
+        if not result.successful:
+            raise HoocError(f'{name}: {result.reason}')
+
+    def _ask(self, name, kind, request, timeout_s, complaint):
+        """Return the response to a request that may be repeated, and is every RETRY_S."""
+        futures, asked = [], -RETRY_S
+
+        def answered():
+            nonlocal asked
+            if time.monotonic() - asked > RETRY_S:
+                asked = time.monotonic()
+                futures.append(self._clients[name, kind].call_async(request))
+            return next((future for future in futures if future.done()), None)
+
+        return self.wait(answered, timeout_s, complaint).result()
 
     def wait_a_moment(self, seconds=0.3):
         """Serve callbacks for so long."""
         deadline = time.monotonic() + seconds
         while time.monotonic() < deadline:
             self.spin()
-
-    def _client(self, name, kind, service):
-        key = name, service
-        if key not in self._clients:
-            self._clients[key] = self.node.create_client(kind, f'{name}/{service}')
-        return self._clients[key]
 
 
 def _exit_by_signal(number, _):

@@ -95,6 +95,29 @@ def test_failed_transitions_and_refused_parameters_say_why(tmp_path):
             supervisor.set_parameters('replay_node', {'rate': -1.0})
 
 
+def test_lost_answers_are_asked_for_again(monkeypatch, tmp_path):
+    monkeypatch.setattr('hooc_perception.supervisor.supervisor.RETRY_S', 0.3)
+    with Supervisor(('replay_node',), isolated=True) as supervisor:
+        class Forgetful:
+            """A client whose every first call is never answered."""
+
+            def __init__(self, client):
+                self.client, self.calls = client, 0
+
+            def call_async(self, request):
+                from rclpy.task import Future
+                self.calls += 1
+                return Future() if self.calls == 1 else self.client.call_async(request)
+
+        forgetful = {key: Forgetful(client) for key, client in supervisor._clients.items()}
+        supervisor._clients = forgetful
+        assert supervisor.state('replay_node') == 1
+        supervisor.set_parameters('replay_node', {'rate': 2.0})
+        with pytest.raises(HoocError, match='parameter bag is empty'):
+            supervisor.bring_up()
+        assert [c.calls >= 2 for c in forgetful.values()] == [True] * 3
+
+
 def test_a_broken_parameter_file_ends_in_a_sentence(tmp_path):
     bad = tmp_path / 'bad.yaml'
     bad.write_text('/**:\n  ros__parameters:\n    rate: fast\n')

@@ -67,18 +67,18 @@ def sample(space, models, config, rng, n_samples, keep, refine_steps, weight=Non
         likely = cloud.p[:, 1:].T.astype(np.float64)
         weight = weight * (likely + config.distrust)
     weight = np.broadcast_to(weight, (len(models), n))
-    shared = (field.data, field.origin, field.voxel, config.free_weight, config.shell_weight,
+    shared = (field.origin, field.voxel, config.free_weight, config.shell_weight,
               config.size_prior)
     drawn = kernel.sample_all(
         rng.integers(0, 2**31, len(models)), n_samples, keep, t.points, t.normals, t.rest,
-        t.rest_cdf, cloud.points, cloud.normals, np.cumsum(weight, 1), *shared,
-        config.size_sigma, config.tilted, 12, 64)
+        t.rest_cdf, cloud.points, cloud.normals, np.cumsum(weight, 1), field.data,
+        kernel.quick_field(field.data), *shared, config.size_sigma, config.tilted, 16, 64)
     H = drawn.reshape(-1, kernel.WIDTH + 1)
     model_of = np.repeat(np.arange(len(models)), keep)
     filled = np.isfinite(H[:, kernel.WIDTH])
     H, model_of = np.ascontiguousarray(H[filled]), model_of[filled]
     kernel.refine_all(rng.integers(0, 2**31, len(H)), H, model_of, t.points, t.normals, 128,
-                      *shared, refine_steps, 0.01, 0.12, 0.08)
+                      field.data, *shared, refine_steps, 0.01, 0.12, 0.08)
     return H, model_of + 1
 
 

@@ -96,6 +96,40 @@ def evidence(h, points, normals, first, last, field, origin, voxel, R):
 
 
 @nb.njit(cache=True)
+def quick_field(field):
+    """Return (X, Y, Z) int8: 100 on the seen surface, 0 hidden, -100 in space seen through."""
+    out = np.zeros(field.shape[:3], np.int8)
+    for x in range(field.shape[0]):
+        for y in range(field.shape[1]):
+            for z in range(field.shape[2]):
+                d, f = field[x, y, z, 0], field[x, y, z, 1]
+                if d < 255:
+                    out[x, y, z] = np.int8(100 * (1.0 - (d / 255.0) ** 2))
+                elif f > 0:
+                    out[x, y, z] = -np.int8(100 * (f / 255.0))
+    return out
+
+
+@nb.njit(cache=True)
+def quick(h, points, n, coarse, origin, voxel, R):
+    """Return the sum of `coarse` over the first n model points of hypothesis `h`."""
+    rotation_of(h, R)
+    nx, ny, nz = coarse.shape
+    inv = 1.0 / voxel
+    total = 0.0
+    for k in range(n):
+        x, y, z = points[k, 0] * h[7], points[k, 1] * h[8], points[k, 2] * h[9]
+        ix = int(np.floor((R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + h[0] - origin[0]) * inv))
+        iy = int(np.floor((R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + h[1] - origin[1]) * inv))
+        iz = int(np.floor((R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + h[2] - origin[2]) * inv))
+        if 0 <= ix < nx and 0 <= iy < ny and 0 <= iz < nz:
+            total += coarse[ix, iy, iz]
+        else:
+            total -= 70.0
+    return total
+
+
+@nb.njit(cache=True)
 def value(h, points, normals, n, field, origin, voxel, free_weight, shell_weight, prior, R):
     """Return the score of a hypothesis: mean evidence, weighed by its size, minus priors."""
     agree, violate, shell = evidence(h, points, normals, 0, n, field, origin, voxel, R)
@@ -169,8 +203,8 @@ def _draw_pose(h, model_points, model_normals, rest, rest_cdf, scene_points, sce
 
 @nb.njit(cache=True)
 def sample(seed, n_samples, keep, model_points, model_normals, rest, rest_cdf, scene_points,
-           scene_normals, scene_cdf, field, origin, voxel, free_weight, shell_weight, prior,
-           size_sigma, general, n_first, n_points):
+           scene_normals, scene_cdf, field, coarse, origin, voxel, free_weight, shell_weight,
+           prior, size_sigma, general, n_first, n_points):
     """
     Draw hypotheses that put a model point on a scene point; return the best (keep, 11).
 
@@ -188,10 +222,8 @@ def sample(seed, n_samples, keep, model_points, model_normals, rest, rest_cdf, s
         i = min(i, scene_points.shape[0] - 1)
         _draw_pose(h, model_points, model_normals, rest, rest_cdf, scene_points, scene_normals,
                    i, size_sigma, general, q)
-        agree, violate, shell = evidence(h, model_points, model_normals, 0, n_first, field,
-                                         origin, voxel, R)
-        # Hopeless after a few points: most would have to be seen, many contradict.
-        if violate > 0.6 * n_first or agree - free_weight * violate < -0.1 * n_first:
+        # Most draws are hopeless, and a few points in a field that fits the cache tell.
+        if quick(h, model_points, n_first, coarse, origin, voxel, R) < 5 * n_first:
             continue
         score = value(h, model_points, model_normals, n_points, field, origin, voxel,
                       free_weight, shell_weight, prior, R)
@@ -271,8 +303,8 @@ def refine_all(seeds, hypotheses, model_of, points, normals, n, field, origin, v
 
 @nb.njit(cache=True, parallel=True)
 def sample_all(seeds, n_samples, keep, points, normals, rest, rest_cdf, scene_points,
-               scene_normals, scene_cdf, field, origin, voxel, free_weight, shell_weight, prior,
-               size_sigma, general, n_first, n_points):
+               scene_normals, scene_cdf, field, coarse, origin, voxel, free_weight, shell_weight,
+           prior, size_sigma, general, n_first, n_points):
     """
     Run `sample` for every model.
 
@@ -283,6 +315,6 @@ def sample_all(seeds, n_samples, keep, points, normals, rest, rest_cdf, scene_po
     out = np.empty((points.shape[0], keep, WIDTH + 1))
     for c in nb.prange(points.shape[0]):
         out[c] = sample(seeds[c], n_samples, keep, points[c], normals[c], rest[c], rest_cdf[c],
-                        scene_points, scene_normals, scene_cdf[c], field, origin, voxel,
+                        scene_points, scene_normals, scene_cdf[c], field, coarse, origin, voxel,
                         free_weight, shell_weight, prior, size_sigma, general, n_first, n_points)
     return out

@@ -41,7 +41,7 @@ def run(args):
                             overrides_of(args.set_parameter))
     seed = folder.seed if args.seed is None else args.seed
     pipeline = Pipeline(folder.models, folder.classifier, chosen, seed, scene_set.max_instances)
-    scenes = scene_set.selected(args.scene) if args.scene else scene_set.scenes
+    scenes = (scene_set.selected(args.scene) if args.scene else scene_set).scenes
     results = []
     for scene in tqdm(scenes, desc='parsing', unit='scene', disable=None):
         change = None

@@ -115,11 +115,15 @@ class Compositor:
         self._count = np.bincount(self._group[self._active[:self.n]],
                                   minlength=self._group.max(initial=0) + 1)
 
-    def deltas(self):
-        """Return (n,) float64: the change of `value` by each flip, inf where not allowed."""
+    def deltas(self, limited=True):
+        """
+        Return (n,) float64: the change of `value` by each flip, inf where not allowed.
+
+        :param limited: False looks past the groups' limit.
+        """
         active = self._active[:self.n]
         deltas = self._deltas[:self.n] + np.where(active, -self._unary, self._unary)
-        if self._max_per_group:
+        if limited and self._max_per_group:
             full = self._count >= self._max_per_group
             deltas[~active & full[self._group]] = np.inf
         return deltas

@@ -64,6 +64,8 @@ class Evidence:
     def __init__(self, observation, probabilities, models, cloud, patch, stride=1):
         """Flatten and stack every `stride`-th row and column once."""
         s = stride
+        # Costs in pixels of the full images shrink with the pixels that are looked at.
+        self.scale = 1.0 / (s * s)
         depth = [v.depth[::s, ::s] for v in observation.views]
         self.size = np.array([d.shape[::-1] for d in depth], np.int64)
         self.first = np.concatenate([[0], np.cumsum(self.size.prod(1))]).astype(np.int64)

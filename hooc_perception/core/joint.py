@@ -30,13 +30,14 @@ class JointEnergy:
         if self.n:
             extents = np.array([models[c - 1].extents for c in pool.category])
             prior = (np.log(pool.size / np.maximum(extents, 1e-9)) ** 2).sum(1)
-        unary = (config.base_cost + stats[:, stat.SHOWN]
+        scale = evidence.scale
+        unary = (config.base_cost * scale + stats[:, stat.SHOWN]
                  * (config.complexity + config.size_prior * prior))
         self._images = Compositor(lists.offsets, lists.pixel, lists.depth, lists.cost,
                                   evidence.cost_none.astype(np.float64), unary=unary,
                                   group=pool.category, max_per_group=max_instances)
         self._overlap = OverlapTerm(pool, models)
-        self._weight = config.overlap
+        self._weight = config.overlap * scale
 
     @property
     def mask(self):
@@ -51,6 +52,11 @@ class JointEnergy:
     def deltas(self):
         """Return (n,) float64: the change by each flip, inf where it is not allowed."""
         return self._images.deltas() + self._weight * self._overlap.deltas()
+
+    def joining_costs(self):
+        """Return (n,) float64: what each would cost if it joined, whatever the group's limit."""
+        return (self._images.deltas(limited=False)
+                + self._weight * self._overlap.deltas())
 
     def flip(self, k):
         """Let candidate k join the subset, or leave it if it is in."""

@@ -30,6 +30,8 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
     search: str = param('joint', 'how the subset is found', choices=('joint', 'genetic'))
     patience: int = param(15, 'kicks in a row without a gain after which the search has '
                           'converged', low=0)
+    finalists: int = param(8, 'joint: candidates a category, beside the chosen, that are looked '
+                           'at in full resolution', low=1)
     rounds: int = param(2, 'joint: rounds of refinement and re-proposal', low=0)
     polish_steps: int = param(60, 'joint: steps of refinement of a chosen object', low=0)
     tolerance_m: float = param(0.03, 'joint: depth residual as bad as no explanation', 'm',
@@ -82,43 +84,102 @@ def _genetic(observation, probabilities, pool, models, config, rng, max_instance
 
 
 def _joint(observation, probabilities, pool, models, config, rng, max_instances, more, late):
-    """Alternate discrete search, refinement and re-proposal."""
+    """
+    Alternate discrete search, refinement and re-proposal, coarse first and in full at last.
+
+    The rounds look at every second row and column; what is left in the running then is
+    refined and decided on all pixels.
+    """
     space = workspace_of(observation, probabilities, models)
-    evidence, weights = space.evidence, _weights(config)
-    stats, lists = evidence.explain(hypotheses_of(pool, models), pool.category, weights,
-                                    lists=True)
-    mask, converged = np.zeros(len(pool), bool), True
+    state = _Search(space.coarse, models, config, max_instances).with_more(pool)
     for turn in range(config.rounds + 1):
-        energy = JointEnergy(evidence, pool, stats, lists, models, config, max_instances)
-        energy.reset(mask)
-        found = local_search(energy, rng, config, late)
-        mask, converged = found.mask, found.converged
-        if turn == config.rounds or not converged:
+        found = state.search(rng, late)
+        if turn == config.rounds or not found.converged:
             break
-        # The refined and the unrefined stay in the pool: the search decides which fit together.
-        chosen = np.flatnonzero(mask)
-        new = Candidates.empty()
-        if len(chosen):
-            H = evidence.polish(
-                hypotheses_of(pool.take(chosen), models), pool.category[chosen], chosen,
-                evidence.compose(chosen, lists), weights, config.complexity, config.size_prior,
-                config.polish_steps, (0.005, 0.06, 0.04), rng)
-            new = candidates_of(H, pool.category[chosen], pool.score[chosen], models)
+        new = state.polished(config.polish_steps, rng)
         if more is not None:
-            new = new.extended(more(pool.take(chosen), turn + 1))
-        if len(new):
-            more_stats, more_lists = evidence.explain(hypotheses_of(new, models), new.category,
-                                                      weights, lists=True)
-            pool, lists = pool.extended(new), lists.extended(more_lists)
-            stats = np.concatenate([stats, more_stats])
-            mask = np.concatenate([mask, np.zeros(len(new), bool)])
-    worth = energy.deltas()[mask]
-    return _answer(observation, probabilities, models, pool, mask, worth, None, converged, config)
+            new = new.extended(more(state.pool.take(state.mask), turn + 1))
+        state = state.with_more(new)
+    considered = state.pool
+    state = state.on(space.evidence, state.in_the_running(config.finalists))
+    if found.converged:
+        found = state.with_more(state.polished(config.polish_steps, rng)).search(rng, late)
+    return _answer(observation, probabilities, models, state.pool, state.mask, state.worth(),
+                   None, found.converged, config, considered)
 
 
-def _answer(observation, probabilities, models, pool, mask, worth, energy, converged, config):
+class _Search:
+    """A pool with its pixel lists on one resolution, and the subset chosen so far."""
+
+    def __init__(self, evidence, models, config, max_instances):
+        self.evidence, self.models, self.config = evidence, models, config
+        self.max_instances = max_instances
+        self.pool, self.mask = Candidates.empty(), np.zeros(0, bool)
+        self.stats = self.lists = self.energy = None
+
+    def with_more(self, new):
+        """Take further Candidates into the pool; return self."""
+        if len(new) or self.lists is None:
+            stats, lists = self.evidence.explain(
+                hypotheses_of(new, self.models), new.category, _weights(self.config), lists=True)
+            first = self.lists is None
+            self.stats = stats if first else np.concatenate([self.stats, stats])
+            self.lists = lists if first else self.lists.extended(lists)
+            self.pool = self.pool.extended(new)
+            self.mask = np.concatenate([self.mask, np.zeros(len(new), bool)])
+        return self
+
+    def search(self, rng, late):
+        """Search from the current subset; return the SearchResult."""
+        self.energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists, self.models,
+                                  self.config, self.max_instances)
+        self.energy.reset(self.mask)
+        found = local_search(self.energy, rng, self.config, late)
+        self.mask = found.mask
+        return found
+
+    def polished(self, steps, rng):
+        """Return refined copies of the chosen; both stay, the search decides which fit."""
+        chosen = np.flatnonzero(self.mask)
+        if not len(chosen) or not steps:
+            return Candidates.empty()
+        c = self.config
+        H = self.evidence.polish(
+            hypotheses_of(self.pool.take(chosen), self.models), self.pool.category[chosen],
+            chosen, self.evidence.compose(chosen, self.lists), _weights(c), c.complexity,
+            c.size_prior, steps, (0.005, 0.06, 0.04), rng)
+        return candidates_of(H, self.pool.category[chosen], self.pool.score[chosen], self.models)
+
+    def in_the_running(self, most):
+        """Return (n,) bool: the chosen and the `most` a category that would cost least to add."""
+        keep = self.mask.copy()
+        costs = self.energy.joining_costs()
+        for c in np.unique(self.pool.category):
+            mine = np.flatnonzero((self.pool.category == c) & ~self.mask)
+            keep[mine[np.argsort(costs[mine], kind='stable')[:most]]] = True
+        return keep
+
+    def on(self, evidence, rows):
+        """Return the same search on another resolution, with only some rows (n,) bool."""
+        other = _Search(evidence, self.models, self.config, self.max_instances)
+        other.with_more(self.pool.take(rows))
+        other.mask = self.mask[rows]
+        return other
+
+    def worth(self):
+        """Return (chosen,) how much the energy rises if an object is removed, in pixels."""
+        if self.energy is None or self.energy.n != len(self.pool):
+            self.energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists,
+                                      self.models, self.config, self.max_instances)
+            self.energy.reset(self.mask)
+        return self.energy.deltas()[self.mask]
+
+
+def _answer(observation, probabilities, models, pool, mask, worth, energy, converged, config,
+            considered=None):
     """Return the ParsedScene of a subset with its evidence."""
     objects = pool.take(mask)
+    pool = pool if considered is None else considered
     if energy is None:
         energy = energy_of(observation, probabilities, objects, models)
     n = len(objects)

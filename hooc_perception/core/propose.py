@@ -24,10 +24,10 @@ class ProposeConfig(FragmentConfig):
     """Parameters of stage 3; those of FragmentConfig serve the method `fragments`."""
 
     method: str = param('field', 'how candidates are found', choices=('field', 'fragments'))
-    samples: int = param(40000, 'field: poses drawn for each category', low=100)
-    pool: int = param(200, 'field: hypotheses a category that are refined in the field', low=5)
+    samples: int = param(30000, 'field: poses drawn for each category', low=100)
+    pool: int = param(150, 'field: hypotheses a category that are refined in the field', low=5)
     refine_steps: int = param(100, 'field: steps of refinement in the field', low=0)
-    polish: int = param(24, 'field: hypotheses a category that are refined in the images', low=1)
+    polish: int = param(16, 'field: hypotheses a category that are refined in the images', low=1)
     polish_steps: int = param(40, 'field: steps of refinement in the images', low=0)
     per_category: int = param(16, 'field: candidates a category', low=1)
     round_samples: int = param(12000, 'field: poses a category in a round of re-proposal', low=10)

@@ -8,9 +8,11 @@ import numba as nb
 import numpy as np
 
 # Columns of the statistics of one hypothesis.
-(SHOWN, AGREE, GAIN, VIOLATE, BEHIND, MISSING, SHARE, LOG_P, COS, RESIDUAL, DELTA,
+(SHOWN, AGREE, GAIN, VIOLATE, BEHIND, MISSING, SHARE, UNLIKELINESS, COS, RESIDUAL, DELTA,
  VIEWS) = range(12)
 STATS = 12
+# Probability 0..255 as a cost: 1 at 2 % and less.
+UNLIKELY = np.minimum(1.0, -np.log(np.maximum(np.arange(256) / 255.0, 0.002)) / 4.0)
 
 
 @nb.njit(cache=True, inline='always')
@@ -24,18 +26,12 @@ def posed(h, vertices, out):
             out[i, k] = R[k, 0] * x + R[k, 1] * y + R[k, 2] * z + h[k]
 
 
-@nb.njit(cache=True)
-def draw_faces(uvz, faces, u0, v0, depth, face):
-    """Draw a projected mesh into a window (see raster.draw), noting the face of each pixel."""
-    for f in range(faces.shape[0]):
-        raster.draw(uvz, faces[f:f + 1], f, u0, v0, depth, face)
-
-
 @nb.njit(cache=True, inline='always')
-def pixel_cost(z, d, foreground, cosine, p, tolerance, w_normal, w_class, w_free):
+def pixel_cost(z, d, foreground, cosine, unlikely, tolerance, w_normal, w_class, w_free):
     """
     Return (cost, state) of showing depth z where d was measured.
 
+    `unlikely` is 0 where the classifier is sure of the category and 1 where it rules it out.
     An unexplained foreground pixel costs 1, seen table 0. State: 1 agrees, 2 seen through,
     3 behind what is measured.
     """
@@ -47,7 +43,7 @@ def pixel_cost(z, d, foreground, cosine, p, tolerance, w_normal, w_class, w_free
     if size >= 1.0:
         return (1.0 if off > 0 else 0.5 + 0.5 * w_free) + 0.5 * w_class, 3 if off > 0 else 2
     return (size + w_normal * (1.0 - max(0.0, cosine))
-            + w_class * min(1.0, -np.log(max(p, 0.002)) / 4.0)), 1
+            + w_class * unlikely), 1
 
 
 @nb.njit(cache=True)
@@ -63,7 +59,8 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
     :param me: the hypothesis' own number in `context`, which is looked through; -1 = none.
     :param size: (views, 2) int64 width, height; first (views + 1,) first pixel of each view.
     :param depth: (P,) float32 measured, NaN none; foreground (P,) bool; normals (P, 3) float32;
-        patch (P,) int32, -1 none; patch_size (patches,) pixels over all views.
+        patch (P,) int32, -1 none; patch_size (patches,) pixels over all views, empty where
+        nobody asks for SHARE.
     :param p: (M, N + 1) uint8, p_row (P,) int32 row of a pixel or -1.
     :param stats: (STATS,) float64, filled.
     :param emit_at: -1, or where to write the pixel lists in out_*.
@@ -87,7 +84,7 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
             continue
         z = np.full((v1 - v0, u1 - u0), np.inf, np.float32)
         face = np.zeros(z.shape, np.int32)
-        draw_faces(uvz, faces, u0, v0, z, face)
+        raster.draw(uvz, faces, -1, u0, v0, z, face)
         cam = -(R_cw[v].T @ t_cw[v])
         for y in range(v1 - v0):
             for x in range(u1 - u0):
@@ -121,10 +118,10 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
                         norm = -norm
                     cosine = (n0 * normals[i, 0] + n1 * normals[i, 1]
                               + n2 * normals[i, 2]) / norm
-                q = 0.0
+                unlikely = 1.0
                 if p_row[i] >= 0:
-                    q = p[p_row[i], category] / 255.0
-                cost, state = pixel_cost(z[y, x], d, foreground[i], cosine, q, tolerance,
+                    unlikely = UNLIKELY[p[p_row[i], category]]
+                cost, state = pixel_cost(z[y, x], d, foreground[i], cosine, unlikely, tolerance,
                                          w_normal, w_class, w_free)
                 stats[DELTA] += cost - base
                 if emit_at >= 0:
@@ -137,8 +134,8 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
                     stats[GAIN] += 1.0 - cost
                     stats[COS] += cosine
                     stats[RESIDUAL] += abs(z[y, x] - d)
-                    stats[LOG_P] += np.log(max(q, 0.002))
-                    s = patch[i]
+                    stats[UNLIKELINESS] += unlikely
+                    s = patch[i] if len(patch_size) else -1
                     if s >= 0:
                         for k in range(n_touched):
                             if touched[k] == s:
@@ -211,6 +208,7 @@ def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start
         F = faces[face_start[c - 1]:face_start[c]]
         stats, trial, q = np.empty(STATS), np.empty(10), np.empty(4)
         none_i, none_f = np.empty(0, np.int64), np.empty(0, np.float32)
+        no_patches = np.empty(0, np.int64)
         step, best = 1.0, np.inf
         for i in range(n_steps + 1):
             trial[:] = H[k]
@@ -229,7 +227,7 @@ def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start
                         trial[7 + j] = min(2.0, max(0.45, trial[7 + j] * np.exp(
                             np.random.normal() * sigma_s * step)))
             explain_one(trial, c, V, F, me[k], context, K, R_cw, t_cw, size, first, depth,
-                        foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal,
+                        foreground, normals, patch, no_patches, p, p_row, tolerance, w_normal,
                         w_class, w_free, stats, -1, none_i, none_f, none_f)
             a, b, d = np.log(trial[7]), np.log(trial[8]), np.log(trial[9])
             value = stats[DELTA] + stats[SHOWN] * (

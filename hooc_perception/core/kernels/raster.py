@@ -35,7 +35,8 @@ def draw(uvz, faces, label, u0, v0, depth, labels):
 
     :param uvz: (V, 3) float64 from project_vertices.
     :param depth: (h, w) float32, read and written; start with inf.
-    :param labels: (h, w) int32, set to `label` where this mesh is nearest.
+    :param labels: (h, w) int32, set to `label` where this mesh is nearest; a negative label
+        stands for the index of the face.
     """
     h, w = depth.shape
     for f in range(faces.shape[0]):
@@ -65,7 +66,7 @@ def draw(uvz, faces, label, u0, v0, depth, labels):
                 z = np.float32(1.0 / (wa * ia + wb * ib + wc * ic))
                 if z < depth[y, x]:
                     depth[y, x] = z
-                    labels[y, x] = label
+                    labels[y, x] = label if label >= 0 else f
 
 
 @nb.njit(cache=True)

@@ -4,8 +4,9 @@
 
 from types import SimpleNamespace
 
-from hooc_perception.core.geometry import posed_vertices
+from hooc_perception.core.geometry import posed_vertices, stage_rng
 from hooc_perception.core.observe import observe, rectify
+from hooc_perception.core.propose import propose, ProposeConfig
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import (
     Camera,
@@ -156,3 +157,17 @@ def empty_desk(things):
 def make_desk(things):
     """Return a function: Candidates -> desk with them."""
     return lambda truth, seed=0: desk_with(things, truth, seed)
+
+
+@pytest.fixture(scope='session')
+def cheap():
+    """Return a ProposeConfig that finds three things in a second."""
+    return ProposeConfig(samples=4000, pool=40, refine_steps=50, polish=8, polish_steps=20,
+                         per_category=5, round_samples=1500, round_pool=20, round_per_category=3)
+
+
+@pytest.fixture(scope='session')
+def desk_pool(desk, cheap):
+    """Return the Candidates that are proposed for the desk."""
+    return propose(desk.observation, desk.probabilities, desk.models, cheap,
+                   stage_rng(0, 'propose'))

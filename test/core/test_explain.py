@@ -59,9 +59,21 @@ def shown_pixels(scene, h, c):
         first += view.depth.size
 
 
+def plain_cost(residual, foreground, cosine, unlikely, w=WEIGHTS):
+    """Return (cost, state) of a pixel, see kernels/explain.py."""
+    if not foreground:
+        return w.free * min(1.0, abs(residual) / w.tolerance_m), 2
+    if residual >= w.tolerance_m:
+        return 1.0 + 0.5 * w.category, 3
+    if residual <= -w.tolerance_m:
+        return 0.5 + 0.5 * w.free + 0.5 * w.category, 2
+    return (abs(residual) / w.tolerance_m + w.normal * (1 - max(0.0, cosine))
+            + w.category * unlikely), 1
+
+
 def plain(scene, h, c, context=None, me=-1):
     """Return ({statistic: value}, [(pixel, depth, cost)]) of one hypothesis."""
-    e, w = scene.evidence, WEIGHTS
+    e = scene.evidence
     probability = {}
     for camera, (u, v), p in zip(scene.desk.probabilities.camera, scene.desk.probabilities.uv,
                                  scene.desk.probabilities.p):
@@ -81,9 +93,8 @@ def plain(scene, h, c, context=None, me=-1):
             continue
         cosine = normal @ e.normals[i] if e.foreground[i] and np.isfinite(e.normals[i, 0]) else 1.0
         p = probability.get(i, 0.0)
-        cost, state = kernel.pixel_cost.py_func(
-            float(z), float(e.depth[i]), e.foreground[i], cosine, p, w.tolerance_m, w.normal,
-            w.category, w.free)
+        unlikely = min(1.0, -np.log(max(p, 0.002)) / 4)
+        cost, state = plain_cost(float(z) - float(e.depth[i]), e.foreground[i], cosine, unlikely)
         entries.append((i, z, cost))
         stats['DELTA'] += float(cost) - float(base[i])
         if state == 1:
@@ -91,7 +102,7 @@ def plain(scene, h, c, context=None, me=-1):
             stats['GAIN'] += 1 - cost
             stats['COS'] += cosine
             stats['RESIDUAL'] += abs(float(z) - float(e.depth[i]))
-            stats['LOG_P'] += np.log(max(p, 0.002))
+            stats['UNLIKELINESS'] += unlikely
             views.add(k)
             if e.patch[i] >= 0:
                 hits[e.patch[i]] += 1
@@ -106,8 +117,8 @@ def plain(scene, h, c, context=None, me=-1):
     return stats, entries
 
 
-NAMES = ('SHOWN', 'AGREE', 'GAIN', 'VIOLATE', 'BEHIND', 'MISSING', 'SHARE', 'LOG_P', 'COS',
-         'RESIDUAL', 'DELTA', 'VIEWS')
+NAMES = ('SHOWN', 'AGREE', 'GAIN', 'VIOLATE', 'BEHIND', 'MISSING', 'SHARE', 'UNLIKELINESS',
+         'COS', 'RESIDUAL', 'DELTA', 'VIEWS')
 
 
 def agree_with_plain(scene, rows, context, me):
@@ -142,24 +153,36 @@ def test_statistics_among_others_that_are_shown_already(scene):
 
 
 def test_pixel_costs():
-    def cost(residual, foreground=True, cosine=1.0, p=1.0):
-        return kernel.pixel_cost(1.0 + residual, 1.0, foreground, cosine, p, 0.03, 0.4, 0.5, 0.7)
+    def cost(residual, foreground=True, cosine=1.0, unlikely=0.0):
+        return kernel.pixel_cost(1.0 + residual, 1.0, foreground, cosine, unlikely, 0.03, 0.4, 0.5,
+                                 0.7)
 
     assert cost(0.0) == (0.0, 1)
     assert cost(0.0, cosine=0.0) == (pytest.approx(0.4), 1)
     assert cost(0.0, cosine=-1.0) == cost(0.0, cosine=0.0)
-    assert cost(0.0, p=0.0) == (pytest.approx(0.5), 1)
+    assert cost(0.0, unlikely=1.0) == (pytest.approx(0.5), 1)
     assert cost(0.015)[0] == pytest.approx(cost(-0.015)[0])
     rising = [cost(r)[0] for r in (0.0, 0.005, 0.015, 0.029)]
-    assert rising == sorted(rising) and rising[-1] < 1.0
-    falling = [cost(0.005, p=p)[0] for p in (0.0, 0.05, 0.3, 0.9, 1.0)]
-    assert falling == sorted(falling, reverse=True)
-    # Far off: behind the reading, or seen through; both cost more than no explanation should gain.
-    assert cost(0.1)[1] == 3 and cost(0.1)[0] >= 1.0
-    assert cost(-0.1)[1] == 2 and cost(-0.1)[0] > 0.5
+    assert rising == sorted(rising)
+    assert rising[-1] < 1.0
+    # Far off, behind the reading or seen through: no better than a bad agreement.
+    assert cost(0.1)[1] == 3
+    assert cost(0.1)[0] >= 1.0
+    assert cost(-0.1)[1] == 2
+    assert cost(-0.1)[0] > 0.5
     # Where the table was measured nothing can be explained.
     assert cost(0.0, foreground=False) == (0.0, 2)
     assert cost(-0.1, foreground=False) == (0.7, 2)
+
+
+def test_the_category_counts(scene):
+    ball_there = scene.true[2].copy()
+    ball_there[7:10] = scene.desk.models[2].extents / scene.desk.models[1].extents
+    can, ball = scene.evidence.explain(np.array([scene.true[2], ball_there]), [3, 2], WEIGHTS)
+    assert can[kernel.UNLIKELINESS] < 0.1 * can[kernel.AGREE]
+    assert ball[kernel.UNLIKELINESS] > 0.7 * ball[kernel.AGREE] > 100
+    blind = scene.evidence.explain(ball_there[None], [2], PixelWeights(category=0.0))[0]
+    assert blind[kernel.GAIN] > ball[kernel.GAIN] + 0.2 * ball[kernel.AGREE]
 
 
 def test_the_true_objects_explain_what_they_cover(scene):
@@ -169,8 +192,6 @@ def test_the_true_objects_explain_what_they_cover(scene):
     assert (stats[:, kernel.VIEWS] == 3).all()
     assert (stats[:, kernel.DELTA] < -0.6 * covered).all()
     assert (stats[:, kernel.RESIDUAL] / stats[:, kernel.AGREE] < 0.003).all()
-    wrong_class = scene.evidence.explain(scene.true[[2]], [3], WEIGHTS, context=None)
-    assert wrong_class[0, kernel.LOG_P] == pytest.approx(stats[2, kernel.LOG_P])
     moved = scene.true.copy()
     moved[:, 0] += 0.05
     assert (scene.evidence.explain(moved, [1, 2, 3], WEIGHTS)[:, kernel.DELTA]

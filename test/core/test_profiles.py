@@ -1,0 +1,78 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Profiles by name, and single parameters changed."""
+
+from dataclasses import fields
+
+from hooc_perception.core.profiles import NAMES, Profile, profile, with_overrides
+from hooc_perception.errors import HoocError
+import pytest
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_every_profile_goes_by_its_name(name):
+    assert profile(name).name == name
+    assert profile(name) == profile(name)
+
+
+def test_the_profiles_are_what_they_say():
+    best, fast, paper = (profile(name) for name in ('best', 'fast', 'paper'))
+    assert best == Profile()
+    assert paper.propose.method == 'fragments'
+    assert (paper.parse.search, paper.parse.rounds) == ('genetic', 0)
+    # The paper's numbers, which tuning must not touch.
+    assert (paper.propose.draws, paper.propose.keep) == (200, 5)
+    assert (paper.parse.population, paper.parse.start_size) == (100, 10.0)
+    assert (paper.parse.elite, paper.parse.drawn, paper.parse.new) == (0.2, 0.2, 0.1)
+    assert paper.parse.cuts == 3
+    assert fast.propose.method == best.propose.method
+    assert fast.parse.search == best.parse.search
+    assert fast.propose.samples < best.propose.samples
+    assert fast.parse.rounds <= best.parse.rounds
+
+
+def test_an_unknown_profile_is_named_with_those_that_there_are():
+    with pytest.raises(HoocError, match="no profile 'bset'; choose one of paper, best, fast"):
+        profile('bset')
+
+
+def test_single_parameters_change_and_the_rest_stays():
+    best = profile('best')
+    changed = with_overrides(best, {'parse.deadline_s': 2, 'propose.samples': 500,
+                                    'parse.rounds': 0, 'observe.max_depth_m': 3.0})
+    assert (changed.parse.deadline_s, changed.parse.rounds) == (2.0, 0)
+    assert changed.propose.samples == 500
+    assert changed.observe.max_depth_m == 3.0
+    assert changed.classify == best.classify
+    assert changed.name == 'best'
+    for stage in ('observe', 'propose', 'parse'):
+        a, b = getattr(best, stage), getattr(changed, stage)
+        differing = {f.name for f in fields(a) if getattr(a, f.name) != getattr(b, f.name)}
+        assert differing <= {'deadline_s', 'rounds', 'samples', 'max_depth_m'}
+    assert best == profile('best')
+    assert with_overrides(best, {}) == best
+
+
+@pytest.mark.parametrize('key', ['parse.deadline', 'prase.deadline_s', 'deadline_s', 'parse',
+                                 'name.x', 'name', '', '.', 'parse.', '.rounds'])
+def test_an_unknown_parameter_is_named(key):
+    with pytest.raises(HoocError, match='no parameter .* observe, classify, propose, parse') as e:
+        with_overrides(profile('best'), {key: 1})
+    assert repr(key) in str(e.value)
+
+
+@pytest.mark.xfail(reason='any attribute of a Profile passes for a stage', strict=True)
+@pytest.mark.parametrize('key', ['__doc__.x', '__class__.name'])
+def test_an_odd_name_is_named_too(key):
+    with pytest.raises(HoocError, match='no parameter'):
+        with_overrides(profile('best'), {key: 1})
+
+
+@pytest.mark.parametrize('key, value, sentence', [
+    ('parse.search', 'luck', 'search is .luck.; choose one of joint, genetic'),
+    ('parse.rounds', 1.5, 'rounds is 1.5, but must be of type int'),
+    ('propose.samples', -1, 'samples is -1, outside'),
+    ('observe.max_depth_m', None, 'max_depth_m is None')])
+def test_a_value_that_is_refused_is_named(key, value, sentence):
+    with pytest.raises(HoocError, match=sentence):
+        with_overrides(profile('fast'), {key: value})

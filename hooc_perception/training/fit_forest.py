@@ -22,11 +22,11 @@ class FitConfig(Config):
     """Parameters of forest growth."""
 
     trees: int = param(40, 'Trees of the forest.', '', 1, 1000)
-    features_per_node: int = param(100, 'Features drawn at random at each node.', '', 1, 10000)
+    features_per_node: int = param(80, 'Features drawn at random at each node.', '', 1, 10000)
     node_samples: int = param(6000, 'Most samples that rank the features of a node; all are '
                               'then split.', '', 10, 100000000)
     max_depth: int = param(26, 'Deepest split.', '', 1, 60)
-    min_leaf: int = param(6, 'Fewest training samples in a leaf.', '', 1, 10000)
+    min_leaf: int = param(10, 'Fewest training samples in a leaf.', '', 1, 10000)
     min_gain_bits: float = param(0.005, 'Least information gain of a split.', 'bit', 0.0, 1.0)
     bins: int = param(64, 'Quantisation levels of a feature.', '', 2, 255)
     prior: float = param(0.3, "Share of a leaf's mass, in samples, that is spread as in the "

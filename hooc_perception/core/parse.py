@@ -43,7 +43,7 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
                                0.0, 2.0)
     complexity: float = param(0.1, 'joint: cost of a covered pixel', '', 0.0, 2.0)
     size_prior: float = param(0.05, 'joint: cost of squared log scale a covered pixel', '', 0, 2.0)
-    base_cost: float = param(4.0, 'joint: cost of an object, in pixels', 'px', 0.0, 1000.0)
+    base_cost: float = param(40.0, 'joint: cost of an object, in pixels', 'px', 0.0, 1000.0)
     overlap: float = param(300.0, 'joint: cost of an object inside others', 'px', 0.0, 1e5)
     deadline_s: float = param(0.0, 'joint: seconds after which the best so far is the answer, '
                               '0 = none', 's', 0.0, 3600.0, runtime=True)

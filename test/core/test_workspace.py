@@ -16,10 +16,10 @@ def test_asked_again_for_the_same_it_is_the_same(desk):
 
 
 def test_other_inputs_give_another(desk):
-    space = workspace_of(desk.observation, desk.probabilities, desk.models)
     for inputs in ((replace(desk.observation), desk.probabilities, desk.models),
                    (desk.observation, replace(desk.probabilities), desk.models),
                    (desk.observation, desk.probabilities, desk.models[:2])):
+        space = workspace_of(desk.observation, desk.probabilities, desk.models)
         other = workspace_of(*inputs)
         assert other is not space
         np.testing.assert_array_equal(other.cloud.points, space.cloud.points)

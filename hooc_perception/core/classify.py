@@ -57,15 +57,15 @@ def classify(observation, classifier, config=ClassifyConfig()):
                                   np.zeros((0, n_columns), np.uint8))
     pixels = features.foreground_pixels(observation)
     stage = _paper if kind == KIND_PAPER else _fused
-    p = stage(observation, pixels, classifier, config)
+    p, row = stage(observation, pixels, classifier, config)
     if p.shape[1] != n_columns:
         raise HoocError(f'the classifier knows {p.shape[1] - 1} classes but says '
                         f'{n_columns - 1}; train the model again')
-    return PixelProbabilities(pixels.camera, pixels.uv, quantised(p))
+    return PixelProbabilities(pixels.camera, pixels.uv, quantised(p)[row])
 
 
 def _paper(observation, pixels, classifier, config):
-    """Return (n, C) probabilities by the forest of each pixel's own view."""
+    """Return (n, C) probabilities by the forest of each pixel's own view, and arange(n)."""
     views = observation.views
     trained = int(classifier['views'])
     if len(views) != trained:
@@ -77,11 +77,11 @@ def _paper(observation, pixels, classifier, config):
         forest = PixelForest.from_arrays(classifier, f'view{index}_', trained)
         points = pixels.points[pixels.camera == index]
         parts.append(forest.predict(images, centres(points, views)))
-    return np.concatenate(parts)
+    return np.concatenate(parts), np.arange(len(pixels.camera))
 
 
 def _fused(observation, pixels, classifier, config):
-    """Return (n, C) probabilities by the one forest over fused features."""
+    """Return (k, C) probabilities by the one forest, and the row (n,) that is each pixel's."""
     forest = Forest.from_arrays(classifier, 'forest_')
     probes = np.ascontiguousarray(classifier['probes'], np.float64)
     if probes.ndim != 2 or probes.shape[1] != 5 or (
@@ -94,5 +94,5 @@ def _fused(observation, pixels, classifier, config):
         p = forest_smooth.spread(
             p, around.voxel[rows], len(around.voxel_points), around.pairs,
             np.exp(-(around.weight / config.smoothing_angle_rad) ** 2), config.smoothing_steps)
-        return p[around.voxel]
-    return p[donor]
+        return p, around.voxel
+    return p, donor

@@ -18,5 +18,15 @@ def overrides_of(texts):
         if not equals or '.' not in key:
             raise HoocError(f'{text!r} does not set a parameter; write STAGE.NAME=VALUE, for '
                             'instance parse.deadline_s=2.0')
-        found[key] = yaml.safe_load(value)
+        try:
+            found[key] = yaml.safe_load(value)
+        except yaml.YAMLError:
+            raise HoocError(f'{text!r}: the value cannot be read; write a plain number or '
+                            'word') from None
+        if isinstance(found[key], str):
+            # YAML 1.1 takes 1e-3 for a word.
+            try:
+                found[key] = float(value)
+            except ValueError:
+                pass
     return found

@@ -16,7 +16,8 @@ def add_arguments(parser):
     parser.add_argument('--out', required=True, help='results file to write')
     parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
                         help='default: the profile that the model was trained for')
-    parser.add_argument('--scene', nargs='+', metavar='ID', help='only these scenes')
+    parser.add_argument('--scene', nargs='+', action='extend',
+                        metavar='ID', help='only these scenes')
     parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--true-poses', action='store_true',
                         help='setting B: the true poses are among the candidates')
@@ -42,13 +43,14 @@ def run(args):
     seed = folder.seed if args.seed is None else args.seed
     pipeline = Pipeline(folder.models, folder.classifier, chosen, seed, scene_set.max_instances)
     scenes = (scene_set.selected(args.scene) if args.scene else scene_set).scenes
+    for scene in scenes if args.true_poses else ():
+        if scene.truth is None:
+            raise HoocError(f'scene {scene.name} has no ground_truth.yaml, which --true-poses '
+                            'needs; leave the option out')
     results = []
     for scene in tqdm(scenes, desc='parsing', unit='scene', disable=None):
         change = None
         if args.true_poses:
-            if scene.truth is None:
-                raise HoocError(f'scene {scene.name} has no ground_truth.yaml, which '
-                                '--true-poses needs; leave the option out')
             change = with_true_poses(scene.truth, folder.models)
         views = scene.depth()
         start = time.monotonic()

@@ -40,6 +40,8 @@ class Config:
             if type(value) is not kind:
                 raise HoocError(f'parameter {f.name} is {value!r}, but must be of type '
                                 f'{kind.__name__}')
+            if value != value:
+                raise HoocError(f'parameter {f.name} is not a number; give one')
             if m.get('choices') and value not in m['choices']:
                 raise HoocError(f'parameter {f.name} is {value!r}; choose one of '
                                 f'{", ".join(m["choices"])}')

@@ -4,6 +4,7 @@
 
 import zlib
 
+from hooc_perception.errors import HoocError
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -80,5 +81,9 @@ def stage_rng(seed, stage, *keys):
 
     Separate processes that know the seed and the stage's name draw the same numbers, so the
     nodes and the one-process chain agree.
+
+    :raises HoocError: where the seed is negative.
     """
+    if seed < 0:
+        raise HoocError(f'the seed is {seed}; give 0 or a positive number')
     return np.random.default_rng([int(seed), zlib.crc32(stage.encode()), *map(int, keys)])

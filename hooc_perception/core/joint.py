@@ -3,7 +3,8 @@
 """
 The energy of the `best` profile: what a set of objects leaves unexplained, in pixels.
 
-    E(S) = sum_i c_i(S) + complexity sum_k A_k + overlap sum_k v_k
+    E(S) = sum_i c_i(S) + sum_k [base_cost + A_k (complexity + size_prior |log scale_k|^2)]
+           + overlap sum_k v_k
 
 c_i is the cost of the object that is nearest at pixel i (kernels/explain.py: depth, normal,
 category, free space), 1 for a foreground pixel that nothing explains; A_k the pixels that object

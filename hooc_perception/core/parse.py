@@ -94,18 +94,18 @@ def _joint(observation, probabilities, pool, models, config, rng, max_instances,
     state = _Search(space.coarse, models, config, max_instances).with_more(pool)
     for turn in range(config.rounds + 1):
         found = state.search(rng, late)
-        if turn == config.rounds or not found.converged:
+        if turn == config.rounds or not found.converged or late():
             break
         new = state.polished(config.polish_steps, rng)
-        if more is not None:
+        if more is not None and not late():
             new = new.extended(more(state.pool.take(state.mask), turn + 1))
         state = state.with_more(new)
     considered = state.pool
     state = state.on(space.evidence, state.in_the_running(config.finalists))
-    if found.converged:
+    if found.converged and not late():
         found = state.with_more(state.polished(config.polish_steps, rng)).search(rng, late)
     return _answer(observation, probabilities, models, state.pool, state.mask, state.worth(),
-                   None, found.converged, config, considered)
+                   None, found.converged and not late(), config, considered)
 
 
 class _Search:

@@ -16,6 +16,7 @@ from hooc_perception.core.propose import ProposeConfig
 from hooc_perception.errors import HoocError
 
 NAMES = ('paper', 'best', 'fast')
+STAGES = ('observe', 'classify', 'propose', 'parse')
 
 
 @dataclass(frozen=True)
@@ -58,8 +59,8 @@ def with_overrides(chosen, overrides):
     """
     for key, value in overrides.items():
         stage, _, name = key.partition('.')
-        config = getattr(chosen, stage, None)
-        if stage == 'name' or config is None or name not in {f.name for f in fields(config)}:
+        config = getattr(chosen, stage) if stage in STAGES else None
+        if config is None or name not in {f.name for f in fields(config)}:
             raise HoocError(f'there is no parameter {key!r}; parameters are named '
                             'STAGE.NAME with the stages observe, classify, propose, parse')
         chosen = replace(chosen, **{stage: replace(config, **{name: value})})

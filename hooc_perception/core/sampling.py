@@ -71,8 +71,9 @@ def sample(space, models, config, rng, n_samples, keep, refine_steps, weight=Non
               config.size_prior)
     drawn = kernel.sample_all(
         rng.integers(0, 2**31, len(models)), n_samples, keep, t.points, t.normals, t.rest,
-        t.rest_cdf, cloud.points, cloud.normals, np.cumsum(weight, 1), field.data,
-        kernel.quick_field(field.data), *shared, config.size_sigma, config.tilted, 16, 64)
+        t.rest_cdf, cloud.points, cloud.normals, np.ascontiguousarray(np.cumsum(weight, 1)),
+        field.data, kernel.quick_field(field.data), *shared, config.size_sigma, config.tilted,
+        16, 64)
     H = drawn.reshape(-1, kernel.WIDTH + 1)
     model_of = np.repeat(np.arange(len(models)), keep)
     filled = np.isfinite(H[:, kernel.WIDTH])
@@ -107,13 +108,13 @@ def distinct(H, category, score, models, most):
         mine = mine[np.argsort(-score[mine], kind='stable')]
         reach, kept = 0.12 * models[c - 1].longest_side, []
         for i in mine:
+            if len(kept) >= most:
+                break
             a, b = H[i], H[kept]
             if not kept or not (
                     (np.linalg.norm(a[:3] - b[:, :3], axis=1) < reach)
                     & (np.abs(np.log(a[7:10] / b[:, 7:10])).max(1) < 0.22)
                     & (np.abs(b[:, 3:7] @ a[3:7]) > 0.92)).any():
                 kept.append(i)
-                if len(kept) == most:
-                    break
         rows += kept
     return np.array(rows, np.int64)

@@ -200,10 +200,10 @@ class ParsedScene:
     """
     The answer for one frame set, with its evidence.
 
-    :ivar objects: the chosen rows of the pool; `score` in [0, 1].
+    :ivar objects: the chosen candidates, refined; `score` in [0, 1].
     :ivar energy: Eq. 1 of the chosen subset (for every profile, so that they compare).
     :ivar visible_ratio: (n,) float32 share of each object's rendered pixels that are in sight.
-    :ivar residual_m: (n,) float32 median absolute depth residual over its visible pixels.
+    :ivar residual_m: (n,) float32 mean absolute depth residual over the pixels where it agrees.
     :ivar energy_delta: (n,) float32 rise of the search's own energy if the object is removed.
     :ivar n_views: (n,) uint8 number of views that show it.
     :ivar pool: every candidate that was considered.

@@ -159,7 +159,6 @@ def test_categories_do_not_compete(things):
     assert distinct(H[:0], np.zeros(0, int), np.zeros(0), things, 3).tolist() == []
 
 
-@pytest.mark.xfail(reason='a limit of none is taken for no limit', strict=True)
 def test_none_wanted_none_given(things):
     H = hypotheses((0, 0, 1), (0.3, 0, 1))
     assert distinct(H, np.ones(2, int), np.zeros(2), things, 0).tolist() == []

@@ -43,10 +43,11 @@ def multiply(a, b, out):
 @nb.njit(cache=True)
 def evidence(h, points, normals, first, last, field, origin, voxel, R):
     """
-    Return (agree, violate) summed over model points first..last - 1 of hypothesis `h`.
+    Return (agree, violate, shell) summed over model points first..last - 1 of hypothesis `h`.
 
     A point on the seen surface with the same facing counts up to 1; a point in space that some
     view sees through, or under the table, counts up to 1 against; hidden points count nothing.
+    A point of the former kind without air before it counts up to 1 in `shell`.
     """
     rotation_of(h, R)
     nx, ny, nz = field.shape[:3]
@@ -187,7 +188,12 @@ def _draw_pose(h, model_points, model_normals, rest, rest_cdf, scene_points, sce
         cx, cy, cz = my * nsz - mz * nsy, mz * nsx - mx * nsz, mx * nsy - my * nsx
         dot = mx * nsx + my * nsy + mz * nsz
         if dot < -0.999:
-            q[0], q[1], q[2], q[3] = 1.0, 0.0, 0.0, 0.0
+            # Half a turn about anything across the normal.
+            n = np.sqrt(mx * mx + my * my)
+            if n > 0.1:
+                q[0], q[1], q[2], q[3] = -my / n, mx / n, 0.0, 0.0
+            else:
+                q[0], q[1], q[2], q[3] = 1.0, 0.0, 0.0, 0.0
         else:
             n = 1.0 / np.sqrt(cx * cx + cy * cy + cz * cz + (1 + dot) * (1 + dot))
             q[0], q[1], q[2], q[3] = cx * n, cy * n, cz * n, (1 + dot) * n

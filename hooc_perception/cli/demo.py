@@ -22,8 +22,8 @@ def add_arguments(parser):
     """Declare the arguments."""
     parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
                         help='folder for the results and the report (default: %(default)s)')
-    parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
-                        help='default: the one the bundled model was trained for')
+    parser.add_argument('--profile', choices=('paper', 'best', 'fast'), default='best',
+                        help='default: %(default)s')
     parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--timeout', type=float, default=300.0, metavar='S',
                         help='how long the scene may take (default: %(default)g s)')
@@ -37,7 +37,7 @@ def run(args):
     """Run the command; return the exit code."""
     root = bundle_root(must_exist=not args.make_bundle)
     if args.make_bundle:
-        make_bundle(root, args.profile or 'best')
+        make_bundle(root)
     from hooc_perception.cli import run as run_command
     from hooc_perception.evaluation.tables import to_text
     from hooc_perception.models.folder import load_model_folder
@@ -60,7 +60,7 @@ def _run_arguments(args, root, results):
     words = [root / SCENE, '--model', root / MODEL, '--out', results, '--report', args.out,
              '--timeout', args.timeout]
     words += ['--seed', args.seed] if args.seed is not None else []
-    words += ['--profile', args.profile] if args.profile else []
+    words += ['--profile', args.profile]
     words += ['--verbose'] if args.verbose else []
     return parser.parse_args([str(word) for word in words])
 
@@ -83,11 +83,12 @@ def bundle_root(must_exist=True):
     return source
 
 
-def make_bundle(root, profile):
+def make_bundle(root):
     """
     Write the bundled scene and model into `root` anew; the same code gives the same bundle.
 
-    The model is trained on generic meshes and cameras; the scene is not part of it.
+    The model is trained on generic meshes and cameras, in the small size of profile `fast`; the
+    scene is not part of it.
     """
     from hooc_perception.replay.bag_writer import write_bag
     from hooc_perception.scenes.scene_set import load_scene_set
@@ -97,7 +98,7 @@ def make_bundle(root, profile):
         twin = Path(folder) / 'twin'
         write_twin(twin, TWIN_SEED, TwinOptions(scenes=(TWIN_SCENE,)), progress=True)
         scene_set = load_scene_set(twin)
-        train(scene_set, root / MODEL, profile, seed=0)
+        train(scene_set, root / MODEL, 'fast', seed=0)
         shutil.rmtree(root / SCENE, ignore_errors=True)
         write_bag(replace(scene_set.scenes[0], name=SCENE.name), scene_set, root / SCENE.parent)
     size = sum(path.stat().st_size for part in (SCENE, MODEL)

@@ -24,6 +24,8 @@ class ProposeConfig(FragmentConfig):
     """Parameters of stage 3; those of FragmentConfig serve the method `fragments`."""
 
     method: str = param('field', 'how candidates are found', choices=('field', 'fragments'))
+    fragments: bool = param(True, 'field: whether the fragments of the pixel classes (the '
+                            "paper's candidates) are added to the hypotheses")
     samples: int = param(30000, 'field: poses drawn for each category', low=100)
     pool: int = param(150, 'field: hypotheses a category that are refined in the field', low=5)
     refine_steps: int = param(100, 'field: steps of refinement in the field', low=0)
@@ -60,8 +62,12 @@ def propose(observation, probabilities, models, config=ProposeConfig(), rng=None
     space = workspace_of(observation, probabilities, models)
     if space.field is None:
         return Candidates.empty()
+    extra = None
+    if config.fragments:
+        found = propose_fragments(observation, probabilities, models, config, rng)
+        extra = hypotheses_of(found, models), found.category
     H, category = sample(space, models, config, rng, config.samples, config.pool,
-                         config.refine_steps)
+                         config.refine_steps, extra=extra)
     return _ranked(space, models, config, rng, H, category, None, config.polish,
                    config.polish_steps, config.per_category)
 

@@ -51,12 +51,13 @@ def _surface(model):
             model.surface_normals[rows].astype(np.float64))
 
 
-def sample(space, models, config, rng, n_samples, keep, refine_steps, weight=None):
+def sample(space, models, config, rng, n_samples, keep, refine_steps, weight=None, extra=None):
     """
     Return hypotheses (m, 11) and their categories (m,): the best of every patch of table.
 
     :param space: Workspace.
     :param weight: (n,) or (models, n) how likely each point of the cloud is drawn.
+    :param extra: (hypotheses (k, 10), categories (k,)) from elsewhere, to be refined with them.
     """
     cloud, field, t = space.cloud, space.field, tables(models)
     n = len(cloud.points)
@@ -78,9 +79,15 @@ def sample(space, models, config, rng, n_samples, keep, refine_steps, weight=Non
     model_of = np.repeat(np.arange(len(models)), keep)
     filled = np.isfinite(H[:, kernel.WIDTH])
     H, model_of = np.ascontiguousarray(H[filled]), model_of[filled]
+    drawn_here = len(H)
+    if extra is not None:
+        H = np.concatenate([H, np.column_stack([extra[0], np.zeros(len(extra[0]))])])
+        model_of = np.concatenate([model_of, extra[1].astype(np.int64) - 1])
     kernel.refine_all(rng.integers(0, 2**31, len(H)), H, model_of, t.points, t.normals, 128,
                       field.data, *shared, refine_steps, 0.01, 0.12, 0.08)
-    return H, model_of + 1
+    # What came from elsewhere has not yet been asked whether it fits at all.
+    fits = (np.arange(len(H)) < drawn_here) | (H[:, kernel.WIDTH] > 0)
+    return H[fits], model_of[fits] + 1
 
 
 def benefit(stats, complexity):

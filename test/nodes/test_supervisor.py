@@ -18,7 +18,10 @@ from hooc_perception.supervisor import environment  # noqa: E402
 from hooc_perception.supervisor.supervisor import Supervisor  # noqa: E402
 
 PARENT = """
+import signal
 import sys
+# A shell that starts tests in the background has their children ignore Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from hooc_perception.supervisor.supervisor import Supervisor
 with Supervisor(('replay_node', 'ingestion_node'), isolated=True) as supervisor:
     print(*[p.pid for p in supervisor.processes.values()], flush=True)

@@ -43,7 +43,7 @@ def profile(name):
                        parse=ParseConfig(search='genetic', rounds=0))
     if name == 'fast':
         return Profile('fast',
-                       propose=ProposeConfig(fragments=False, samples=12000, pool=60,
+                       propose=ProposeConfig(samples=12000, pool=60,
                                              refine_steps=60, polish=10, polish_steps=20,
                                              per_category=8, round_samples=4000, round_pool=20,
                                              round_per_category=4),

@@ -24,7 +24,7 @@ class ProposeConfig(FragmentConfig):
     """Parameters of stage 3; those of FragmentConfig serve the method `fragments`."""
 
     method: str = param('field', 'how candidates are found', choices=('field', 'fragments'))
-    fragments: bool = param(True, 'field: whether the fragments of the pixel classes (the '
+    fragments: bool = param(False, 'field: whether the fragments of the pixel classes (the '
                             "paper's candidates) are added to the hypotheses")
     samples: int = param(30000, 'field: poses drawn for each category', low=100)
     pool: int = param(150, 'field: hypotheses a category that are refined in the field', low=5)

@@ -92,7 +92,6 @@ class Evidence:
             mine = np.flatnonzero(probabilities.camera == k)
             image[probabilities.uv[mine, 1], probabilities.uv[mine, 0]] = mine
         self.p_row = flat(p_row)
-        self.models = models
         self.vertices = np.concatenate([m.vertices for m in models])
         self.faces = np.concatenate([m.faces for m in models]).astype(np.int32)
         self.vertex_start = np.cumsum([0] + [len(m.vertices) for m in models])

@@ -131,9 +131,7 @@ class _Search:
 
     def search(self, rng, late):
         """Search from the current subset; return the SearchResult."""
-        self.energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists, self.models,
-                                  self.config, self.max_instances)
-        self.energy.reset(self.mask)
+        self._weigh()
         found = local_search(self.energy, rng, self.config, late)
         self.mask = found.mask
         return found
@@ -169,10 +167,14 @@ class _Search:
     def worth(self):
         """Return (chosen,) how much the energy rises if an object is removed, in pixels."""
         if self.energy is None or self.energy.n != len(self.pool):
-            self.energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists,
-                                      self.models, self.config, self.max_instances)
-            self.energy.reset(self.mask)
+            self._weigh()
         return self.energy.deltas()[self.mask]
+
+    def _weigh(self):
+        """Set up the energy of the pool as it is now, at the current subset."""
+        self.energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists, self.models,
+                                  self.config, self.max_instances)
+        self.energy.reset(self.mask)
 
 
 def _answer(observation, probabilities, models, pool, mask, worth, energy, converged, config,

@@ -106,6 +106,10 @@ fi
 rm -f "$STAMP"
 export PIP_DISABLE_PIP_VERSION_CHECK=1
 say 'installing the pinned Python packages (about 1 GB on disk; a few minutes on a slow line)'
+# The plain build of OpenCV, which older environments hold, owns the same files as the contrib one.
+if "$VENV/bin/python" -m pip show -q opencv-python-headless 2>/dev/null; then
+  "$VENV/bin/python" -m pip uninstall -qqq -y opencv-python-headless opencv-contrib-python-headless
+fi
 # The list is complete, so nothing needs resolving.
 "$VENV/bin/python" -m pip install -q --no-deps --use-pep517 -r requirements.txt
 "$VENV/bin/python" -m pip install -q --no-deps --no-build-isolation --editable .

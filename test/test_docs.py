@@ -60,6 +60,6 @@ def test_every_pinned_direct_dependency_is_explained():
     text = (ROOT / 'docs' / 'libraries.md').read_text().lower()
     direct = (ROOT / 'requirements.in').read_text().split('# ROS 2')[0]
     names = [line for line in direct.splitlines() if line and not line.startswith('#')]
-    aliases = {'opencv-python-headless': 'opencv', 'networkx': 'trimesh'}
+    aliases = {'opencv-contrib-python-headless': 'opencv', 'networkx': 'trimesh'}
     missing = [name for name in names if aliases.get(name, name).lower() not in text]
     assert not missing

@@ -20,7 +20,7 @@ PYTHONS = ((3, 11), (3, 12))
 # Module -> (distribution, what does not work without it).
 PACKAGES = {
     'numpy': ('numpy', 'anything'), 'scipy': ('scipy', 'anything'), 'numba': ('numba', 'anything'),
-    'yaml': ('PyYAML', 'scene sets'), 'cv2': ('opencv-python-headless', 'scene sets'),
+    'yaml': ('PyYAML', 'scene sets'), 'cv2': ('opencv-contrib-python-headless', 'scene sets'),
     'trimesh': ('trimesh', 'meshes'), 'manifold3d': ('manifold3d', 'the repair of meshes'),
     'fcl': ('python-fcl', 'training'), 'mujoco': ('mujoco', 'training of the best profile'),
     'sklearn': ('scikit-learn', 'evaluation'), 'rosbags': ('rosbags', 'bags'),

@@ -31,7 +31,10 @@ class Cloud:
 @dataclass(frozen=True)
 class Field:
     """
-    A voxel grid: channel 0 distance to the seen surface, 1 free evidence, 2-4 its normal.
+    A voxel grid: distance to the seen surface (channel 0), free evidence (1), normal (2-4) and
+    signed distance (5).
+
+    See kernels/field.py.
 
     :ivar data: (X, Y, Z, 8) uint8.
     :ivar origin: (3,) float64 world corner of voxel (0, 0, 0), metres.

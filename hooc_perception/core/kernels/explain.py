@@ -3,7 +3,8 @@
 """Render hypotheses into all views at once and hold them against what was measured."""
 
 from hooc_perception.core.kernels import raster
-from hooc_perception.core.kernels.hypotheses import multiply, rotation_of
+from hooc_perception.core.kernels.hypotheses import rotation_of
+from hooc_perception.core.kernels.pull import accumulate, multiply, pulled
 import numba as nb
 import numpy as np
 
@@ -49,7 +50,7 @@ def pixel_cost(z, d, foreground, cosine, unlikely, tolerance, w_normal, w_class,
 @nb.njit(cache=True)
 def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, first, depth,
                 foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal, w_class,
-                w_free, stats, emit_at, out_pixel, out_depth, out_cost):
+                w_free, stats, pull, emit_at, out_pixel, out_depth, out_cost):
     """
     Hold one hypothesis against every view.
 
@@ -63,6 +64,7 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
         nobody asks for SHARE.
     :param p: (M, N + 1) uint8, p_row (P,) int32 row of a pixel or -1.
     :param stats: (STATS,) float64, filled.
+    :param pull: (9, 10) float64, filled with the equations of kernels/pull.py; empty: not asked.
     :param emit_at: -1, or where to write the pixel lists in out_*.
     :return: number of pixels with a reading that it covers.
     """
@@ -70,6 +72,9 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
     world = np.empty(vertices.shape)
     posed(h, vertices, world)
     stats[:] = 0.0
+    pull[:] = 0.0
+    R = np.empty((3, 3))
+    rotation_of(h, R)
     n = 0
     touched = np.empty(64, np.int64)
     hits = np.zeros(64)
@@ -135,6 +140,19 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
                     stats[COS] += cosine
                     stats[RESIDUAL] += abs(z[y, x] - d)
                     stats[UNLIKELINESS] += unlikely
+                    if pull.shape[0] and cosine > 0.3 and normals[i, 0] == normals[i, 0]:
+                        # Along the ray of the pixel from the camera's centre.
+                        a0 = (x + u0 - K[v, 0, 2]) / K[v, 0, 0]
+                        a1 = (y + v0 - K[v, 1, 2]) / K[v, 1, 1]
+                        r0 = R_cw[v, 0, 0] * a0 + R_cw[v, 1, 0] * a1 + R_cw[v, 2, 0]
+                        r1 = R_cw[v, 0, 1] * a0 + R_cw[v, 1, 1] * a1 + R_cw[v, 2, 1]
+                        r2 = R_cw[v, 0, 2] * a0 + R_cw[v, 1, 2] * a1 + R_cw[v, 2, 2]
+                        off = z[y, x] - d
+                        slope = (r0 * normals[i, 0] + r1 * normals[i, 1] + r2 * normals[i, 2])
+                        accumulate(pull, h, R, cam[0] + r0 * z[y, x], cam[1] + r1 * z[y, x],
+                                   cam[2] + r2 * z[y, x], normals[i, 0], normals[i, 1],
+                                   normals[i, 2], slope * off,
+                                   cosine / (abs(off) / tolerance + 0.2))
                     s = patch[i] if len(patch_size) else -1
                     if s >= 0:
                         for k in range(n_touched):
@@ -182,7 +200,7 @@ def explain_all(H, category, me, vertices, vertex_start, faces, face_start, cont
             H[k], c, vertices[vertex_start[c - 1]:vertex_start[c]],
             faces[face_start[c - 1]:face_start[c]], me[k], context, K, R_cw, t_cw, size, first,
             depth, foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal, w_class,
-            w_free, stats[k], emit_at[k], out_pixel, out_depth, out_cost)
+            w_free, stats[k], np.empty((0, 0)), emit_at[k], out_pixel, out_depth, out_cost)
     return stats, n
 
 
@@ -192,7 +210,9 @@ def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start
                tolerance, w_normal, w_class, w_free, complexity, prior, n_steps, sigma_t,
                sigma_r, sigma_s):
     """
-    Climb with every hypothesis (m, 10), in place, against the images: a (1+1) strategy.
+    Climb with every hypothesis (m, 10), in place, against the images.
+
+    Random steps of adapting length, and after each that helped pulls until they help no more.
 
     What falls is the cost of the scene with the hypothesis in `context` instead of its old self
     `me`, plus complexity x the pixels it covers, plus a prior on its scale.
@@ -207,13 +227,19 @@ def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start
         V = vertices[vertex_start[c - 1]:vertex_start[c]]
         F = faces[face_start[c - 1]:face_start[c]]
         stats, trial, q = np.empty(STATS), np.empty(10), np.empty(4)
+        here, there = np.zeros((9, 10)), np.zeros((9, 10))
         none_i, none_f = np.empty(0, np.int64), np.empty(0, np.float32)
         no_patches = np.empty(0, np.int64)
-        step, best = 1.0, np.inf
+        step, best, agreeing, fresh = 1.0, np.inf, 0.0, False
         for i in range(n_steps + 1):
             trial[:] = H[k]
-            part = np.random.random()
-            if i > 0:
+            pulls = fresh
+            if pulls:
+                pulled(here, agreeing, H[k], prior * agreeing * tolerance * tolerance, 0.45, 2.0,
+                       trial)
+                fresh = False
+            elif i > 0:
+                part = np.random.random()
                 if part < 0.75:
                     for j in range(3):
                         trial[j] += np.random.normal() * sigma_t * step
@@ -228,15 +254,18 @@ def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start
                             np.random.normal() * sigma_s * step)))
             explain_one(trial, c, V, F, me[k], context, K, R_cw, t_cw, size, first, depth,
                         foreground, normals, patch, no_patches, p, p_row, tolerance, w_normal,
-                        w_class, w_free, stats, -1, none_i, none_f, none_f)
+                        w_class, w_free, stats, there, -1, none_i, none_f, none_f)
             a, b, d = np.log(trial[7]), np.log(trial[8]), np.log(trial[9])
             value = stats[DELTA] + stats[SHOWN] * (
                 complexity + prior * (a * a + b * b + d * d))
             if value < best:
                 best = value
                 H[k] = trial
-                step = min(2.0, step * 1.3)
-            else:
+                here, there = there, here
+                agreeing, fresh = stats[AGREE], stats[AGREE] > 20
+                if not pulls:
+                    step = min(2.0, step * 1.3)
+            elif not pulls:
                 step = max(0.05, step * 0.93)
         reached[k] = best
     return reached

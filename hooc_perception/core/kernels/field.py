@@ -104,7 +104,12 @@ def _smallest_eigenvector(C):
 
 @nb.njit(cache=True)
 def fill_distance(field, origin, voxel, points, normals, truncation):
-    """Write the truncated distance to the nearest point, and its normal, into channels 0, 2-4."""
+    """
+    Write what is known of the nearest point of the surface.
+
+    Channel 0: distance to it, 255 = `truncation`; 2-4: its normal; 5: height of the voxel's
+    centre over its tangent plane, 128 + 127 = `truncation`.
+    """
     nx, ny, nz = field.shape[:3]
     r = int(np.ceil(truncation / voxel))
     best = np.full((nx, ny, nz), truncation * truncation, np.float32)
@@ -127,6 +132,8 @@ def fill_distance(field, origin, voxel, points, normals, truncation):
                         field[x, y, z, 2] = np.uint8(128.5 + 127 * normals[i, 0])
                         field[x, y, z, 3] = np.uint8(128.5 + 127 * normals[i, 1])
                         field[x, y, z, 4] = np.uint8(128.5 + 127 * normals[i, 2])
+                        height = dx * normals[i, 0] + dy * normals[i, 1] + dz * normals[i, 2]
+                        field[x, y, z, 5] = np.uint8(128.5 + 127 * height / truncation)
 
 
 @nb.njit(cache=True)

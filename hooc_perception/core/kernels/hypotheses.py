@@ -7,12 +7,15 @@ A hypothesis is 10 numbers: translation (3, metres), quaternion xyzw (4), scale 
 (3, relative to the generic model).
 """
 
+from hooc_perception.core.kernels.pull import accumulate, multiply, pulled
 import numba as nb
 import numpy as np
 
 # Least mean of a few points in the quick field: a visible fifth of a model reaches it.
 QUICK_MEAN = 12.0
 SHELL_M = 0.014
+# What 255 in channel 0 of the field stands for.
+TRUNCATION_M = 0.02
 # The best of every patch of table are kept, so that no part of a scene crowds out the rest.
 CELL_M = 0.04
 PER_CELL = 4
@@ -29,27 +32,20 @@ def rotation_of(h, R):
     R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
 
 
-@nb.njit(cache=True, inline='always')
-def multiply(a, b, out):
-    """Write the quaternion product a * b (xyzw) into out (4,)."""
-    x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1]
-    y = a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0]
-    z = a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3]
-    w = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]
-    s = 1.0 / np.sqrt(x * x + y * y + z * z + w * w)
-    out[0], out[1], out[2], out[3] = x * s, y * s, z * s, w * s
-
-
 @nb.njit(cache=True)
-def evidence(h, points, normals, first, last, field, origin, voxel, R):
+def evidence(h, points, normals, first, last, field, origin, voxel, R, pull):
     """
     Return (agree, violate, shell) summed over model points first..last - 1 of hypothesis `h`.
 
     A point on the seen surface with the same facing counts up to 1; a point in space that some
     view sees through, or under the table, counts up to 1 against; hidden points count nothing.
     A point of the former kind without air before it counts up to 1 in `shell`.
+
+    :param pull: (9, 10) float64, filled with the equations of kernels/pull.py; empty: not asked.
     """
     rotation_of(h, R)
+    pull[:] = 0.0
+    plane = TRUNCATION_M / 127.0
     nx, ny, nz = field.shape[:3]
     inv = 1.0 / voxel
     ox, oy, oz = (h[0] - origin[0]) * inv, (h[1] - origin[1]) * inv, (h[2] - origin[2]) * inv
@@ -85,6 +81,15 @@ def evidence(h, points, normals, first, last, field, origin, voxel, R):
             if dot > 0:
                 e = d / 255.0
                 agree += (1.0 - e * e) * min(1.0, dot)
+                if pull.shape[0] and dot > 0.3:
+                    u = (field[ix, iy, iz, 2] - 128.0) / 127.0
+                    v = (field[ix, iy, iz, 3] - 128.0) / 127.0
+                    w = (field[ix, iy, iz, 4] - 128.0) / 127.0
+                    height = ((field[ix, iy, iz, 5] - 128.0) * plane
+                              + voxel * (u * (gx - ix - 0.5) + v * (gy - iy - 0.5)
+                                         + w * (gz - iz - 0.5)))
+                    accumulate(pull, h, R, gx * voxel + origin[0], gy * voxel + origin[1],
+                               gz * voxel + origin[2], u, v, w, height, min(1.0, dot))
         # Just outside of the model there should be air: else it lies inside a larger thing.
         a, b, c = normals[k, 0] / sx, normals[k, 1] / sy, normals[k, 2] / sz
         n = SHELL_M * inv / np.sqrt(a * a + b * b + c * c + 1e-20)
@@ -133,9 +138,10 @@ def quick(h, points, n, coarse, origin, voxel, R):
 
 
 @nb.njit(cache=True)
-def value(h, points, normals, n, field, origin, voxel, free_weight, shell_weight, prior, R):
+def value(h, points, normals, n, field, origin, voxel, free_weight, shell_weight, prior, R,
+          pull):
     """Return the score of a hypothesis: mean evidence, weighed by its size, minus priors."""
-    agree, violate, shell = evidence(h, points, normals, 0, n, field, origin, voxel, R)
+    agree, violate, shell = evidence(h, points, normals, 0, n, field, origin, voxel, R, pull)
     area = (h[7] * h[8] + h[8] * h[9] + h[7] * h[9]) / 3.0
     a, b, c = np.log(h[7]), np.log(h[8]), np.log(h[9])
     return ((agree - free_weight * violate - shell_weight * shell) / n * area / (area + 0.5) * 1.5
@@ -224,7 +230,7 @@ def sample(seed, n_samples, keep, model_points, model_normals, rest, rest_cdf, s
     np_y = int(field.shape[1] * voxel / CELL_M) + 1
     slots = np.full((np_x * np_y, PER_CELL, WIDTH + 1), -np.inf)
     h = np.empty(WIDTH)
-    q, R = np.empty(4), np.empty((3, 3))
+    q, R, no_pull = np.empty(4), np.empty((3, 3)), np.empty((0, 0))
     for _ in range(n_samples):
         i = np.searchsorted(scene_cdf, np.random.random() * scene_cdf[-1])
         i = min(i, scene_points.shape[0] - 1)
@@ -234,7 +240,7 @@ def sample(seed, n_samples, keep, model_points, model_normals, rest, rest_cdf, s
         if quick(h, model_points, n_first, coarse, origin, voxel, R) < QUICK_MEAN * n_first:
             continue
         score = value(h, model_points, model_normals, n_points, field, origin, voxel,
-                      free_weight, shell_weight, prior, R)
+                      free_weight, shell_weight, prior, R, no_pull)
         x = min(np_x - 1, max(0, int((h[0] - origin[0]) / CELL_M)))
         y = min(np_y - 1, max(0, int((h[1] - origin[1]) / CELL_M)))
         cell = slots[x * np_y + y]
@@ -257,39 +263,49 @@ def sample(seed, n_samples, keep, model_points, model_normals, rest, rest_cdf, s
 def refine(seed, h, points, normals, n, field, origin, voxel, free_weight, shell_weight,
            prior, n_steps, sigma_t, sigma_r, sigma_s):
     """
-    Climb from hypothesis `h` (in place) by random steps whose length adapts; return the score.
+    Climb from hypothesis `h` (in place) by pulls and random steps; return the score.
 
-    A (1+1) evolution strategy with the 1/5 success rule: the objective is a mean over voxels,
-    not smooth enough for a gradient, and an evaluation costs microseconds.
+    A (1+1) evolution strategy with the 1/5 success rule sees all of the score, a pull
+    (kernels/pull.py) follows each of its gains until it helps no more.
     """
     np.random.seed(seed)
     R, q = np.empty((3, 3)), np.empty(4)
-    best = value(h, points, normals, n, field, origin, voxel, free_weight, shell_weight, prior, R)
+    here, there = np.zeros((9, 10)), np.zeros((9, 10))
+    best = value(h, points, normals, n, field, origin, voxel, free_weight, shell_weight, prior, R,
+                 here)
     trial = np.empty(WIDTH)
-    step = 1.0
+    step, fresh = 1.0, True
     for _ in range(n_steps):
-        part = np.random.random()
         trial[:] = h
-        if part < 0.75:
-            for k in range(3):
-                trial[k] += np.random.normal() * sigma_t * step
-        if part > 0.4:
-            q[0] = np.random.normal() * sigma_r * step / 2
-            q[1] = np.random.normal() * sigma_r * step / 2
-            q[2] = np.random.normal() * sigma_r * step
-            q[3] = 1.0
-            multiply(q, trial[3:7], trial[3:7])
-        if part > 0.6 or part < 0.2:
-            for k in range(3):
-                trial[7 + k] = min(2.0, max(0.45, trial[7 + k] * np.exp(
-                    np.random.normal() * sigma_s * step)))
+        pulls = fresh
+        if pulls:
+            pulled(here, n, h, prior * n * TRUNCATION_M * TRUNCATION_M, 0.45, 2.0, trial)
+            fresh = False
+        else:
+            part = np.random.random()
+            if part < 0.75:
+                for k in range(3):
+                    trial[k] += np.random.normal() * sigma_t * step
+            if part > 0.4:
+                q[0] = np.random.normal() * sigma_r * step / 2
+                q[1] = np.random.normal() * sigma_r * step / 2
+                q[2] = np.random.normal() * sigma_r * step
+                q[3] = 1.0
+                multiply(q, trial[3:7], trial[3:7])
+            if part > 0.6 or part < 0.2:
+                for k in range(3):
+                    trial[7 + k] = min(2.0, max(0.45, trial[7 + k] * np.exp(
+                        np.random.normal() * sigma_s * step)))
         score = value(trial, points, normals, n, field, origin, voxel, free_weight,
-                      shell_weight, prior, R)
+                      shell_weight, prior, R, there)
         if score > best:
             best = score
             h[:] = trial
-            step = min(2.0, step * 1.3)
-        else:
+            here, there = there, here
+            fresh = True
+            if not pulls:
+                step = min(2.0, step * 1.3)
+        elif not pulls:
             step = max(0.05, step * 0.95)
     return best
 

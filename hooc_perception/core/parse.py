@@ -33,7 +33,7 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
     finalists: int = param(8, 'joint: candidates a category, beside the chosen, that are looked '
                            'at in full resolution', low=1)
     rounds: int = param(2, 'joint: rounds of refinement and re-proposal', low=0)
-    polish_steps: int = param(60, 'joint: steps of refinement of a chosen object', low=0)
+    polish_steps: int = param(20, 'joint: steps of refinement of a chosen object', low=0)
     tolerance_m: float = param(0.03, 'joint: depth residual as bad as no explanation', 'm',
                                0.002, 0.5)
     normal_weight: float = param(0.4, 'joint: cost of a perpendicular normal', '', 0.0, 2.0)

@@ -75,23 +75,25 @@ class OverlapTerm:
     a volume, so a weighted sum with a Compositor is one more energy.
 
     :param objects: Candidates; class id c is models[c - 1].
+    :param count: samples of each interior, a multiple of 64.
     """
 
-    def __init__(self, objects, models):
+    def __init__(self, objects, models, count=SAMPLES):
         """Compare all pairs whose bounding boxes meet; start from the empty subset."""
         self.n = n = len(objects)
+        self._count = count
         self._active = np.zeros(n, bool)
         classes, row = np.unique(objects.category, return_inverse=True)
-        samples = np.zeros((len(classes), SAMPLES, 3))
+        samples = np.zeros((len(classes), count, 3))
         grids = np.zeros((len(classes), CELLS, CELLS, CELLS), bool)
         for i, c in enumerate(classes):
-            samples[i] = interior_samples(models[c - 1])
+            samples[i] = interior_samples(models[c - 1], count)
             grids[i] = occupancy(models[c - 1])
         R = (Rotation.from_quat(objects.rotation_xyzw).as_matrix() if n
              else np.zeros((0, 3, 3)))
         size = np.maximum(objects.size.astype(np.float64), 1e-9)
         pairs = _meeting_pairs(R, objects.translation, size)
-        bits = np.zeros((len(pairs), SAMPLES // 64), np.uint64)
+        bits = np.zeros((len(pairs), count // 64), np.uint64)
         kernels.sample_bits(pairs, row.astype(np.int32), R, objects.translation, size, samples,
                             grids, bits)
         # Keep pairs with a common volume, both directions, ordered by the first.
@@ -101,7 +103,7 @@ class OverlapTerm:
         self._bits = bits[kept]
         self._start = np.searchsorted(pairs[kept, 0], np.arange(n + 1))
         self._reverse = np.lexsort((pairs[kept, 0], pairs[kept, 1]))
-        self._union, self._once = np.zeros((2, n, SAMPLES // 64), np.uint64)
+        self._union, self._once = np.zeros((2, n, count // 64), np.uint64)
         self.reset(self._active)
 
     @property
@@ -112,7 +114,7 @@ class OverlapTerm:
     @property
     def value(self):
         """Return the sum of v_k over the current subset."""
-        return self._covered / SAMPLES
+        return self._covered / self._count
 
     def reset(self, mask):
         """Start again from the subset `mask` (n,) bool."""
@@ -125,7 +127,7 @@ class OverlapTerm:
         deltas = np.zeros(self.n, np.int64)
         kernels.flip_deltas(self._start, self._other, self._reverse, self._bits, self._active,
                             self._union, self._once, deltas)
-        return deltas / SAMPLES
+        return deltas / self._count
 
     def flip(self, k):
         """Let object k join the subset, or leave it if it is in."""
@@ -141,7 +143,7 @@ class OverlapTerm:
         counts = np.zeros(len(members), np.int64)
         kernels.covered(members, np.asarray(mask, bool), self._start, self._other, self._bits,
                         counts)
-        return counts / SAMPLES
+        return counts / self._count
 
     def evaluate(self, mask):
         """Return the sum of v_k over the subset `mask` (n,) bool; the current one stays."""

@@ -12,11 +12,15 @@ from dataclasses import dataclass
 from hooc_perception.core.config import param
 from hooc_perception.core.evidence import hypotheses_of, PixelWeights
 from hooc_perception.core.fragments import FragmentConfig, propose_fragments
+from hooc_perception.core.kernels import explain as stat
 from hooc_perception.core.sampling import benefit, distinct, sample
 from hooc_perception.core.types import Candidates
 from hooc_perception.core.workspace import workspace_of
 import numpy as np
 from scipy.spatial.transform import Rotation
+
+# Pixels in half resolution that are enough to refine a hypothesis.
+MANY = 120
 
 
 @dataclass(frozen=True)
@@ -81,32 +85,44 @@ def propose_more(observation, probabilities, models, objects, config=ProposeConf
     space = workspace_of(observation, probabilities, models)
     if config.method == 'fragments' or space.field is None:
         return Candidates.empty()
-    weights, context = PixelWeights(), None
-    if len(objects):
-        _, lists = space.coarse.explain(hypotheses_of(objects, models), objects.category,
-                                        weights, lists=True)
-        context = space.coarse.compose(np.arange(len(objects)), lists)
-    left = space.coarse.unexplained(context)
+    left = space.coarse.unexplained(_shown(space.coarse, objects, models))
     if not left.any():
         return Candidates.empty()
     H, category = sample(space, models, config, rng, config.round_samples, config.round_pool,
                          config.refine_steps, left + 0.02)
-    return _ranked(space, models, config, rng, H, category, context, config.round_per_category,
+    return _ranked(space, models, config, rng, H, category, objects, config.round_per_category,
                    config.polish_steps, config.round_per_category)
 
 
-def _ranked(space, models, config, rng, H, category, context, n_polish, steps, n_keep):
+def _shown(evidence, objects, models):
+    """Return the context that `objects` (Candidates) make, None for none."""
+    if objects is None or not len(objects):
+        return None
+    _, lists = evidence.explain(hypotheses_of(objects, models), objects.category, PixelWeights(),
+                                lists=True)
+    return evidence.compose(np.arange(len(objects)), lists)
+
+
+def _ranked(space, models, config, rng, H, category, objects, n_polish, steps, n_keep):
     """Rank hypotheses in the images, refine the best there and return the best of those."""
     weights, coarse = PixelWeights(), space.coarse
-    score = benefit(coarse.explain(H, category, weights, context), config.complexity)
+    context = _shown(coarse, objects, models)
+    stats = coarse.explain(H, category, weights, context)
+    score = benefit(stats, config.complexity)
     # Half of the places go to the field's own order: it knows what the images hide.
     rows = np.union1d(distinct(H, category, score, models, n_polish),
                       distinct(H, category, H[:, 10], models, n_polish // 2))
-    H, category = H[rows], category[rows]
-    if steps:
-        context = coarse.nothing if context is None else context
-        H = coarse.polish(H, category, np.full(len(H), -1), context, weights, config.complexity,
-                          0.1, steps, (0.006, 0.08, 0.05), rng)
+    H, category, covered = H[rows], category[rows], stats[rows, stat.SHOWN]
+    # A few hundred pixels pin a thing down: large ones need no more, thin ones need them all.
+    for evidence, low, high in ((space.evidence, 0, MANY), (coarse, MANY, 8 * MANY),
+                                (space.coarsest, 8 * MANY, np.inf)):
+        mine = np.flatnonzero((low <= covered) & (covered < high))
+        if steps and len(mine):
+            context_here = context if evidence is coarse else _shown(evidence, objects, models)
+            H[mine, :10] = evidence.polish(
+                H[mine], category[mine], np.full(len(mine), -1),
+                evidence.nothing if context_here is None else context_here, weights,
+                config.complexity, 0.1, steps, (0.006, 0.08, 0.05), rng)
     score = benefit(coarse.explain(H, category, weights, context), config.complexity)
     rows = distinct(H, category, score, models, n_keep)
     return candidates_of(H[rows], category[rows], score[rows], models)

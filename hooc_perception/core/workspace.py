@@ -13,10 +13,11 @@ _latest = None
 
 class Workspace:
     """
-    The fused cloud, its field and the pixels of all views, in full and in half resolution.
+    The fused cloud, its field and the pixels of all views, in three resolutions.
 
     :ivar cloud: Cloud; `field` Field, None where nothing stands on the table.
-    :ivar evidence: Evidence of every pixel; `coarse` of every second row and column.
+    :ivar evidence: Evidence of every pixel; `coarse` of every second row and column, `coarsest`
+        of every fourth.
     """
 
     def __init__(self, observation, probabilities, models):
@@ -26,6 +27,7 @@ class Workspace:
         self.field = build_field(observation, self.cloud) if len(self.patch) else None
         self.evidence = Evidence(observation, probabilities, models, self.cloud, self.patch)
         self.coarse = Evidence(observation, probabilities, models, self.cloud, self.patch, 2)
+        self.coarsest = Evidence(observation, probabilities, models, self.cloud, self.patch, 4)
 
 
 def workspace_of(observation, probabilities, models):

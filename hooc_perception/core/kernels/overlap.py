@@ -58,7 +58,7 @@ def count_bits(word):
     return np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, parallel=True)
 def sample_bits(pairs, model, R, t, size, samples, grids, bits):
     """
     Set a bit for every interior sample of pairs[i, 0] that lies inside pairs[i, 1].
@@ -71,7 +71,7 @@ def sample_bits(pairs, model, R, t, size, samples, grids, bits):
     :param bits: (m, words) uint64, written.
     """
     cells = grids.shape[1]
-    for i in range(pairs.shape[0]):
+    for i in nb.prange(pairs.shape[0]):
         k, j = pairs[i, 0], pairs[i, 1]
         # One affine map takes samples of k to grid coordinates of j.
         A = np.empty((3, 3))

@@ -31,13 +31,13 @@ class ProposeConfig(FragmentConfig):
     fragments: bool = param(False, 'field: whether the fragments of the pixel classes (the '
                             "paper's candidates) are added to the hypotheses")
     samples: int = param(10000, 'field: poses drawn for each category', low=100)
-    pool: int = param(150, 'field: hypotheses a category that are refined in the field', low=5)
+    pool: int = param(80, 'field: hypotheses a category that are refined in the field', low=5)
     refine_steps: int = param(20, 'field: steps of refinement in the field', low=0)
-    polish: int = param(16, 'field: hypotheses a category that are refined in the images', low=1)
+    polish: int = param(15, 'field: hypotheses a category that are refined in the images', low=1)
     polish_steps: int = param(10, 'field: steps of refinement in the images', low=0)
-    per_category: int = param(16, 'field: candidates a category', low=1)
+    per_category: int = param(15, 'field: candidates a category', low=1)
     round_samples: int = param(4000, 'field: poses a category in a round of re-proposal', low=10)
-    round_pool: int = param(50, 'field: hypotheses a category refined in such a round', low=1)
+    round_pool: int = param(30, 'field: hypotheses a category refined in such a round', low=1)
     round_per_category: int = param(6, 'field: candidates a category from such a round', low=1)
     free_weight: float = param(0.7, 'field: weight of a point in space that is seen through', '',
                                0.0, 5.0)

@@ -74,7 +74,7 @@ def sample(space, models, config, rng, n_samples, keep, refine_steps, weight=Non
         rng.integers(0, 2**31, len(models)), n_samples, keep, t.points, t.normals, t.rest,
         t.rest_cdf, cloud.points, cloud.normals, np.ascontiguousarray(np.cumsum(weight, 1)),
         field.data, kernel.quick_field(field.data), *shared, config.size_sigma, config.tilted,
-        16, 64)
+        16, 32)
     H = drawn.reshape(-1, kernel.WIDTH + 1)
     model_of = np.repeat(np.arange(len(models)), keep)
     filled = np.isfinite(H[:, kernel.WIDTH])

@@ -31,10 +31,10 @@ class Cloud:
 @dataclass(frozen=True)
 class Field:
     """
-    A voxel grid: distance to the seen surface (channel 0), free evidence (1), normal (2-4) and
-    signed distance (5).
+    A voxel grid of what is known about the nearest surface.
 
-    See kernels/field.py.
+    Channels: distance 0, free evidence 1, normal 2-4, signed distance to its plane 5; see
+    kernels/field.py.
 
     :ivar data: (X, Y, Z, 8) uint8.
     :ivar origin: (3,) float64 world corner of voxel (0, 0, 0), metres.

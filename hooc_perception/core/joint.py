@@ -22,9 +22,11 @@ class JointEnergy:
     The joint energy over a pool; see core/compositor.py for what a search calls.
 
     :param stats: (n, STATS) of the pool, `lists` its PixelLists.
+    :param judged: (n,) what each object costs, in pixels, instead of base_cost.
     """
 
-    def __init__(self, evidence, pool, stats, lists, models, config, max_instances=0):
+    def __init__(self, evidence, pool, stats, lists, models, config, max_instances=0,
+                 judged=None):
         """Lay the pool's pixel lists into a Compositor and compare its volumes."""
         self.n = len(pool)
         prior = np.zeros(self.n)
@@ -32,8 +34,9 @@ class JointEnergy:
             extents = np.array([models[c - 1].extents for c in pool.category])
             prior = (np.log(pool.size / np.maximum(extents, 1e-9)) ** 2).sum(1)
         scale = evidence.scale
-        unary = (config.base_cost * scale + stats[:, stat.SHOWN]
-                 * (config.complexity + config.size_prior * prior))
+        base = config.base_cost if judged is None else judged
+        unary = base * scale + stats[:, stat.SHOWN] * (config.complexity
+                                                       + config.size_prior * prior)
         self._images = Compositor(lists.offsets, lists.pixel, lists.depth, lists.cost,
                                   evidence.cost_none.astype(np.float64), unary=unary,
                                   group=pool.category, max_per_group=max_instances)

@@ -19,6 +19,7 @@ from hooc_perception.core.kernels import explain as stat
 from hooc_perception.core.local_search import local_search, LocalSearchConfig
 from hooc_perception.core.propose import candidates_of
 from hooc_perception.core.types import Candidates, ParsedScene
+from hooc_perception.core.verify import features
 from hooc_perception.core.workspace import workspace_of
 import numpy as np
 
@@ -43,14 +44,17 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
                                0.0, 2.0)
     complexity: float = param(0.1, 'joint: cost of a covered pixel', '', 0.0, 2.0)
     size_prior: float = param(0.05, 'joint: cost of squared log scale a covered pixel', '', 0, 2.0)
-    base_cost: float = param(40.0, 'joint: cost of an object, in pixels', 'px', 0.0, 1000.0)
+    base_cost: float = param(40.0, 'joint: cost of an object that no verifier has judged', 'px',
+                             0.0, 1000.0)
+    verify_weight: float = param(80.0, 'joint: worth of the odds that the verifier gives a '
+                                 'candidate, each unit of their logarithm', 'px', 0.0, 1000.0)
     overlap: float = param(300.0, 'joint: cost of an object inside others', 'px', 0.0, 1e5)
     deadline_s: float = param(0.0, 'joint: seconds after which the best so far is the answer, '
                               '0 = none', 's', 0.0, 3600.0, runtime=True)
 
 
 def parse(observation, probabilities, pool, models, config=ParseConfig(), rng=None,
-          max_instances=0, more=None):
+          max_instances=0, more=None, verifier=None):
     """
     Return the ParsedScene: the objects that together explain the frame set best.
 
@@ -58,6 +62,7 @@ def parse(observation, probabilities, pool, models, config=ParseConfig(), rng=No
     :param max_instances: most objects of one category, 0 = no limit.
     :param more: callable (objects: Candidates, round: int) -> Candidates that proposes anew for
         what the objects leave unexplained; None = the pool is all there is.
+    :param verifier: core.verify.Verifier of the model, None = the energy decides alone.
     """
     start = time.monotonic()
 
@@ -69,7 +74,7 @@ def parse(observation, probabilities, pool, models, config=ParseConfig(), rng=No
                          late)
     else:
         scene = _joint(observation, probabilities, pool, models, config, rng, max_instances,
-                       more, late)
+                       more, late, verifier)
     return scene.timed(parse=time.monotonic() - start)
 
 
@@ -83,15 +88,32 @@ def _genetic(observation, probabilities, pool, models, config, rng, max_instance
                    energy.energy(mask), converged, config)
 
 
-def _joint(observation, probabilities, pool, models, config, rng, max_instances, more, late):
+def _joint(observation, probabilities, pool, models, config, rng, max_instances, more, late,
+           verifier):
+    """Search the scene, ask the verifier what it thinks of the candidates, and decide."""
+    state, found, considered = search_scene(observation, probabilities, pool, models, config,
+                                            rng, max_instances, more, late)
+    score = None
+    if verifier is not None and len(state.pool):
+        score = verifier.probability(features(state.evidence, state.pool, state.stats,
+                                              state.lists, models, state.weighed()))
+        found = state.judged(score).search(rng, late)
+    return _answer(observation, probabilities, models, state.pool, state.mask, state.worth(),
+                   None, found.converged and not late(), config, considered, score)
+
+
+def search_scene(observation, probabilities, pool, models, config, rng, max_instances=0,
+                 more=None, late=lambda: False):
     """
     Alternate discrete search, refinement and re-proposal, coarse first and in full at last.
 
     The rounds look at every second row and column; what is left in the running then is
     refined and decided on all pixels.
+
+    :return: (Search at its optimum, SearchResult, Candidates that were considered before).
     """
     space = workspace_of(observation, probabilities, models)
-    state = _Search(space.coarse, models, config, max_instances).with_more(pool)
+    state = Search(space.coarse, models, config, max_instances).with_more(pool)
     for turn in range(config.rounds + 1):
         found = state.search(rng, late)
         if turn == config.rounds or not found.converged or late():
@@ -104,17 +126,16 @@ def _joint(observation, probabilities, pool, models, config, rng, max_instances,
     state = state.on(space.evidence, state.in_the_running(config.finalists))
     if found.converged and not late():
         found = state.with_more(state.polished(config.polish_steps, rng)).search(rng, late)
-    return _answer(observation, probabilities, models, state.pool, state.mask, state.worth(),
-                   None, found.converged and not late(), config, considered)
+    return state, found, considered
 
 
-class _Search:
+class Search:
     """A pool with its pixel lists on one resolution, and the subset chosen so far."""
 
     def __init__(self, evidence, models, config, max_instances):
         self.evidence, self.models, self.config = evidence, models, config
         self.max_instances = max_instances
-        self.pool, self.mask = Candidates.empty(), np.zeros(0, bool)
+        self.pool, self.mask, self.odds = Candidates.empty(), np.zeros(0, bool), None
         self.stats = self.lists = self.energy = None
 
     def with_more(self, new):
@@ -159,26 +180,36 @@ class _Search:
 
     def on(self, evidence, rows):
         """Return the same search on another resolution, with only some rows (n,) bool."""
-        other = _Search(evidence, self.models, self.config, self.max_instances)
+        other = Search(evidence, self.models, self.config, self.max_instances)
         other.with_more(self.pool.take(rows))
         other.mask = self.mask[rows]
         return other
 
-    def worth(self):
-        """Return (chosen,) how much the energy rises if an object is removed, in pixels."""
+    def judged(self, probability):
+        """Let the odds of each candidate (n,) weigh in its cost; return self."""
+        p = np.clip(probability, 0.02, 0.98)
+        self.odds = -self.config.verify_weight * np.log(p / (1 - p))
+        return self
+
+    def weighed(self):
+        """Return the JointEnergy of the pool as it is, at the current subset."""
         if self.energy is None or self.energy.n != len(self.pool):
             self._weigh()
-        return self.energy.deltas()[self.mask]
+        return self.energy
+
+    def worth(self):
+        """Return (chosen,) how much the energy rises if an object is removed, in pixels."""
+        return self.weighed().deltas()[self.mask]
 
     def _weigh(self):
         """Set up the energy of the pool as it is now, at the current subset."""
         self.energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists, self.models,
-                                  self.config, self.max_instances)
+                                  self.config, self.max_instances, self.odds)
         self.energy.reset(self.mask)
 
 
 def _answer(observation, probabilities, models, pool, mask, worth, energy, converged, config,
-            considered=None):
+            considered=None, probability=None):
     """Return the ParsedScene of a subset with its evidence."""
     objects = pool.take(mask)
     pool = pool if considered is None else considered
@@ -198,6 +229,8 @@ def _answer(observation, probabilities, models, pool, mask, worth, energy, conve
     seen = alone - stats[:, stat.BEHIND]
     agree = stats[:, stat.AGREE]
     share = agree / np.maximum(agree + stats[:, stat.VIOLATE] + 20, 1)
+    if probability is not None:
+        share = probability[mask]
     objects = replace(objects, score=np.clip(share, 0, 1).astype(np.float32))
     return ParsedScene(objects, energy, (seen / alone).astype(np.float32),
                        (stats[:, stat.RESIDUAL] / np.maximum(agree, 1)).astype(np.float32),

@@ -9,6 +9,7 @@ from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe, rectify
 from hooc_perception.core.parse import parse
 from hooc_perception.core.propose import propose, propose_more
+from hooc_perception.core.verify import Verifier
 
 
 class Pipeline:
@@ -25,6 +26,7 @@ class Pipeline:
         """Keep what all scenes share."""
         self.models, self.classifier, self.profile = tuple(models), classifier, profile
         self.seed, self.max_instances = seed, max_instances
+        self.verifier = Verifier.from_arrays(classifier)
 
     def parse_scene(self, views, change_pool=None):
         """
@@ -49,7 +51,7 @@ class Pipeline:
         if change_pool is not None:
             pool = change_pool(pool)
         scene = parse(observation, probabilities, pool, self.models, p.parse, self.rng('parse'),
-                      self.max_instances, self.more(observation, probabilities))
+                      self.max_instances, self.more(observation, probabilities), self.verifier)
         return scene.timed(**seconds)
 
     def more(self, observation, probabilities):

@@ -3,8 +3,8 @@
 """
 `hooc train`: from generic meshes and cameras to a MODEL folder, without looking at a scene.
 
-What a profile learns is data in PROFILES. Further parts that are learnt from synthetic
-scenes add a function to EXTRA_STEPS; each returns arrays that are stored with the classifier.
+What a profile learns is data in PROFILES. Each step is a function of the TrainingContext that
+returns arrays which are stored with the classifier, and may read those of the steps before.
 """
 
 from dataclasses import asdict, dataclass
@@ -21,6 +21,7 @@ from hooc_perception.models.mesh import load_mesh
 from hooc_perception.synthesis.training_scenes import PAPER, training_scenes
 from hooc_perception.training import fit_pixels
 from hooc_perception.training.fit_forest import fit, FitConfig
+from hooc_perception.training.fit_verifier import fit_verifier, VerifierConfig
 from hooc_perception.training.fused_scenes import fused_table, FusedScenesConfig
 import joblib
 import numpy as np
@@ -28,8 +29,9 @@ from tqdm import tqdm
 
 PROFILES = {
     'paper': (fit_pixels.PixelFitConfig(),),
-    'best': (FusedScenesConfig(), FitConfig()),
-    'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24)),
+    'best': (FusedScenesConfig(), FitConfig(), VerifierConfig()),
+    'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24),
+             VerifierConfig(verifier_scenes=30)),
 }
 
 
@@ -57,10 +59,6 @@ class TrainingContext:
     def bar(self, total, what, unit):
         """Return a progress bar; call its `update(n)`."""
         return tqdm(total=total, desc=what, unit=unit, disable=not self.progress)
-
-
-# Functions of a TrainingContext that return a dict of arrays (numbers or one string).
-EXTRA_STEPS = []
 
 
 def train(scene_set, out, profile='best', seed=0, progress=True, configs=None, jobs=0):
@@ -99,13 +97,13 @@ def generic_models(scene_set, seed, progress=False):
 
 def train_classifier(models, cameras, profile='best', seed=0, max_instances=0, configs=None,
                      jobs=0, progress=False):
-    """Return the classifier's dict of arrays, extra steps included."""
+    """Return the classifier's dict of arrays, from a step for each of the configs."""
     configs = tuple(configs or PROFILES[profile])
     context = TrainingContext(tuple(models), tuple(cameras), max_instances, profile, seed,
                               configs, jobs or joblib.cpu_count(), progress, {})
-    step = _paper if isinstance(configs[0], fit_pixels.PixelFitConfig) else _fused
-    for run in (step, *EXTRA_STEPS):
-        context.classifier.update(run(context))
+    for config in configs:
+        if type(config) in STEPS:
+            context.classifier.update(STEPS[type(config)](context, config))
     return dict(context.classifier)
 
 
@@ -119,9 +117,8 @@ def _head(context, kind, held_out):
             'settings': np.array(json.dumps(settings, sort_keys=True))}
 
 
-def _paper(context):
+def _paper(context, config):
     """Learn one multi-view forest a view (METHOD 1.1 and 1.2)."""
-    config, = context.configs
     n_classes = len(context.models) + 1
     pools = []
     for stage, n, pixels in (
@@ -141,9 +138,9 @@ def _paper(context):
     return {**_head(context, KIND_PAPER, {}), **arrays}
 
 
-def _fused(context):
+def _fused(context, scenes):
     """Learn one forest over fused features, and how well it does on scenes it never saw."""
-    scenes, forest_config = context.configs
+    forest_config = next(c for c in context.configs if isinstance(c, FitConfig))
     with context.bar(scenes.scenes, 'synthetic scenes', 'scene') as bar:
         table = fused_table(context.models, context.cameras, scenes, context.seed,
                             context.max_instances, context.jobs, bar.update)
@@ -173,3 +170,8 @@ def _counted(items, bar):
     for item in items:
         yield item
         bar.update(1)
+
+
+# What is learned, by the type of the Config that describes it; in the order of the configs.
+STEPS = {fit_pixels.PixelFitConfig: _paper, FusedScenesConfig: _fused,
+         VerifierConfig: fit_verifier}

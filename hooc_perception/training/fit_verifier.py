@@ -1,0 +1,99 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Learn to verify candidates (core/verify.py) from synthetic scenes parsed by the whole chain.
+
+The scenes are of the same kind as those that taught the classifier, but others: a classifier
+looks too good on what it has seen.
+"""
+
+from dataclasses import dataclass, replace
+
+from hooc_perception.core.classify import classify
+from hooc_perception.core.config import Config, param
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.observe import observe
+from hooc_perception.core.parse import search_scene
+from hooc_perception.core.pipeline import Pipeline
+from hooc_perception.core.profiles import profile as profile_of
+from hooc_perception.core.propose import propose
+from hooc_perception.core.verify import FEATURES, features
+from hooc_perception.synthesis.training_scenes import training_scene
+from hooc_perception.training.fit_forest import fit, FitConfig, quantise, thresholds
+from hooc_perception.training.fused_scenes import FusedScenesConfig, scene_config
+from joblib import delayed, Parallel
+import numpy as np
+
+
+@dataclass(frozen=True)
+class VerifierConfig(Config):
+    """How many scenes the verifier sees and when a candidate counts as right."""
+
+    verifier_scenes: int = param(60, 'Synthetic scenes that are parsed.', '', 4, 100000)
+    random_rigs: float = param(0.2, 'Share of them seen by another rig of one to four cameras.',
+                               '', 0.0, 1.0)
+    reshape_low: float = param(0.7, 'Least departure of the objects from the generic meshes.',
+                               '', 0.0, 3.0)
+    reshape_high: float = param(1.5, 'Largest departure.', '', 0.0, 3.0)
+    right_within: float = param(0.35, "Distance of a right candidate's centre from the true one, "
+                                'as a share of the longest side.', '', 0.05, 1.0)
+    forest: FitConfig = param(FitConfig(trees=60, features_per_node=9, node_samples=20000,
+                                        max_depth=14, min_leaf=6, prior=2.0),
+                              'Growth of the forest.')
+
+
+def verifier_table(models, cameras, classifier, config, profile, seed, max_instances=0, n_jobs=1,
+                   progress=None):
+    """
+    Return (x (n, FEATURES) float32, right (n,) uint8) of all candidates in the running.
+
+    :param progress: called with 1 after every scene.
+    """
+    chain = profile_of(profile)
+    repeats = min(max_instances, 4) or 3
+    with Parallel(n_jobs=n_jobs, return_as='generator') as parallel:
+        parts = []
+        for part in parallel(delayed(_scene)(models, cameras, classifier, config, chain, seed,
+                                             max_instances, repeats, k)
+                             for k in range(config.verifier_scenes)):
+            parts.append(part)
+            if progress:
+                progress(1)
+    return np.concatenate([x for x, _ in parts]), np.concatenate([y for _, y in parts])
+
+
+def _scene(models, cameras, classifier, config, chain, seed, max_instances, repeats, k):
+    """Return (x, right) of the synthetic scene k."""
+    rng = stage_rng(seed, 'verifier scenes', k)
+    rig = 'random' if rng.random() < config.random_rigs else 'jittered'
+    strength = float(rng.uniform(config.reshape_low, config.reshape_high))
+    scene = training_scene(models, cameras, rng, replace(
+        scene_config(FusedScenesConfig(), repeats), rig=rig, reshape_strength=strength))
+    pipeline = Pipeline(models, classifier, chain, seed, max_instances)
+    observation = observe(scene.views)
+    probabilities = classify(observation, classifier, chain.classify)
+    pool = propose(observation, probabilities, models, chain.propose, pipeline.rng('propose'))
+    state, _, _ = search_scene(observation, probabilities, pool, models, chain.parse,
+                               pipeline.rng('parse'), max_instances,
+                               pipeline.more(observation, probabilities))
+    x = features(state.evidence, state.pool, state.stats, state.lists, models, state.weighed())
+    right = np.zeros(len(x), np.uint8)
+    for o in scene.objects:
+        reach = config.right_within * models[o.category - 1].longest_side
+        right |= ((state.pool.category == o.category)
+                  & (np.linalg.norm(state.pool.translation - o.translation, axis=1) < reach))
+    return x, right
+
+
+def fit_verifier(context, config):
+    """Return the arrays of a verifier, `verifier_*`; see training/train.py for the context."""
+    with context.bar(config.verifier_scenes, 'parsed scenes', 'scene') as bar:
+        x, right = verifier_table(context.models, context.cameras, context.classifier, config,
+                                  context.profile, context.seed, context.max_instances,
+                                  context.jobs, bar.update)
+    if not len(x) or right.min() == right.max():
+        return {}
+    rng = stage_rng(context.seed, 'verifier')
+    cuts = thresholds(x, config.forest.bins, rng)
+    forest = fit(quantise(x, cuts), right, 2, cuts, config.forest, rng, context.jobs)
+    return {'verifier_features': np.uint8(len(FEATURES)), **forest.arrays('verifier_')}

@@ -29,7 +29,7 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
     """Parameters of stage 4; GeneticConfig serves `genetic`, LocalSearchConfig `joint`."""
 
     search: str = param('joint', 'how the subset is found', choices=('joint', 'genetic'))
-    patience: int = param(15, 'kicks in a row without a gain after which the search has '
+    patience: int = param(8, 'kicks in a row without a gain after which the search has '
                           'converged', low=0)
     finalists: int = param(8, 'joint: candidates a category, beside the chosen, that are looked '
                            'at in full resolution', low=1)
@@ -48,6 +48,8 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
                              0.0, 1000.0)
     verify_weight: float = param(80.0, 'joint: worth of the odds that the verifier gives a '
                                  'candidate, each unit of their logarithm', 'px', 0.0, 1000.0)
+    missing_against_false: float = param(3.0, 'joint: how much worse it is to miss an object than '
+                                         'to report a false one', '', 0.01, 100.0)
     overlap: float = param(300.0, 'joint: cost of an object inside others', 'px', 0.0, 1e5)
     deadline_s: float = param(0.0, 'joint: seconds after which the best so far is the answer, '
                               '0 = none', 's', 0.0, 3600.0, runtime=True)
@@ -188,7 +190,8 @@ class Search:
     def judged(self, probability):
         """Let the odds of each candidate (n,) weigh in its cost; return self."""
         p = np.clip(probability, 0.02, 0.98)
-        self.odds = -self.config.verify_weight * np.log(p / (1 - p))
+        c = self.config
+        self.odds = -c.verify_weight * (np.log(p / (1 - p)) + np.log(c.missing_against_false))
         return self
 
     def weighed(self):

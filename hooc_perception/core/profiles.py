@@ -43,11 +43,10 @@ def profile(name):
                        parse=ParseConfig(search='genetic', rounds=0))
     if name == 'fast':
         return Profile('fast',
-                       propose=ProposeConfig(samples=12000, pool=60,
-                                             refine_steps=60, polish=10, polish_steps=20,
-                                             per_category=8, round_samples=4000, round_pool=20,
-                                             round_per_category=4),
-                       parse=ParseConfig(rounds=1, polish_steps=30, patience=5))
+                       propose=ProposeConfig(samples=4000, pool=40, refine_steps=12, polish=8,
+                                             polish_steps=6, per_category=8, round_samples=1500,
+                                             round_pool=12, round_per_category=3),
+                       parse=ParseConfig(rounds=1, polish_steps=10, patience=3, finalists=4))
     raise HoocError(f'there is no profile {name!r}; choose one of {", ".join(NAMES)}')
 
 

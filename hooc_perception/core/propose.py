@@ -31,7 +31,7 @@ class ProposeConfig(FragmentConfig):
     fragments: bool = param(False, 'field: whether the fragments of the pixel classes (the '
                             "paper's candidates) are added to the hypotheses")
     samples: int = param(10000, 'field: poses drawn for each category', low=100)
-    pool: int = param(80, 'field: hypotheses a category that are refined in the field', low=5)
+    pool: int = param(120, 'field: hypotheses a category that are refined in the field', low=5)
     refine_steps: int = param(20, 'field: steps of refinement in the field', low=0)
     polish: int = param(15, 'field: hypotheses a category that are refined in the images', low=1)
     polish_steps: int = param(10, 'field: steps of refinement in the images', low=0)

@@ -106,9 +106,10 @@ class ParsingNode(StageNode):
         return response
 
     def on_reset(self, request, response):
-        """Forget what waits to be joined and take what viewers show away."""
+        """Forget what waits to be joined and take the last answer back."""
         self.input.clear()
-        self.output.clear()
+        if self.active:
+            self.output.clear(self.now_ns(), self.config.target_frame)
         response.success, response.message = True, json.dumps({'objects': 0})
         return response
 

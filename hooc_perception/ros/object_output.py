@@ -8,7 +8,14 @@ import re
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.ros.conversions import header, pose_array_message
-from hooc_perception.ros.stage_messages import labels_json, objects_messages, points_message
+from hooc_perception.ros.point_clouds import cloud_message, row_dtype
+from hooc_perception.ros.stage_messages import (
+    labels_json,
+    OBJECT_COLUMNS,
+    objects_messages,
+    points_message,
+)
+import numpy as np
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
@@ -70,10 +77,17 @@ class ObjectOutput:
         self._poses.publish(poses)
         return ids
 
-    def clear(self):
-        """Take away what viewers show."""
+    def clear(self, stamp_ns, frame):
+        """Take the last answer back: empty messages on every topic, no markers."""
+        head, none = header(stamp_ns, frame), np.zeros((0, 3))
+        self._labels.publish(String(data=labels_json(self.models, self.meshes)))
+        self._attributes.publish(cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head))
+        for publisher in self._by_category:
+            publisher.publish(PoseArray(header=head))
         self._markers.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
         self._shown = []
+        self._unexplained.publish(points_message(none, head))
+        self._poses.publish(PoseArray(header=head))
 
     def _markers_message(self, poses, found, ids, head):
         """Return DELETE for what was shown and is gone, ADD for what stands there now."""

@@ -279,6 +279,12 @@ def test_enable_and_reset(chain):
     assert bench.spin(lambda: heard['objects/poses'] and heard['objects/markers'])
     assert bench.spin(call(bench, Trigger, 'reset').done)
     assert bench.spin(lambda: heard['objects/markers'][-1].markers[0].action == Marker.DELETEALL)
+    # Who acts on the answer learns that it is void, in every form that it has.
+    assert bench.spin(lambda: heard['objects/poses'][-1].poses == [])
+    assert heard['objects/attributes'][-1].width == 0
+    assert heard['objects/can/poses'][-1].poses == []
+    assert heard['scene/unexplained'][-1].width == 0
+    assert json.loads(heard['objects/labels'][-1].data)['objects'] == {}
 
 
 def test_a_refusing_stage_says_why_and_the_next_set_is_parsed(chain):

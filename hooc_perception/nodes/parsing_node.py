@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stage 4: candidates -> the objects that together explain the frame set."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import json
 import sys
 import time
@@ -12,6 +12,7 @@ from hooc_perception.core.config import param
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe
 from hooc_perception.core.parse import parse
+from hooc_perception.core.tracking import TrackConfig, Tracker
 from hooc_perception.core.unexplained import unexplained_points
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
@@ -28,7 +29,7 @@ from std_srvs.srv import SetBool, Trigger
 
 
 @dataclass(frozen=True)
-class ParsingConfig(StageConfig):
+class ParsingConfig(TrackConfig, StageConfig):
     """Parameters of the parsing node."""
 
     max_instances: int = param(-1, 'Objects of one category in a scene at most; 0 sets no '
@@ -54,6 +55,7 @@ class ParsingNode(StageNode):
         limit = self.config.max_instances
         self.max_instances = model.max_instances if limit < 0 else limit
         warmed(self, model, self.try_out)
+        self.tracker = Tracker(model.models, self.config)
         self.output = ObjectOutput(self, model.models, [
             (model.mesh_path(m.name).resolve().as_uri(), model.mesh_sha256[m.name])
             for m in model.models])
@@ -91,9 +93,12 @@ class ParsingNode(StageNode):
         except HoocError as error:
             self.diagnostics.error('parse', 'refused', str(error))
             return
-        left = unexplained_points(observation, parsed.objects, self.models)
+        self.tracker.config = self.config
+        ids, objects = self.tracker.update(stamp_ns, parsed.objects)
+        parsed = replace(parsed, objects=objects)
+        left = unexplained_points(observation, objects, self.models)
         age_s = (self.now_ns() - stamp_ns) * 1e-9
-        ids = self.output.publish(parsed, stamp_ns, self.config.target_frame, age_s, left)
+        self.output.publish(parsed, ids, stamp_ns, self.config.target_frame, age_s, left)
         self.detect.answer(stamp_ns, parsed, ids, self.models)
         self.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
                             energy=float(parsed.energy.total), age_s=age_s)
@@ -106,8 +111,9 @@ class ParsingNode(StageNode):
         return response
 
     def on_reset(self, request, response):
-        """Forget what waits to be joined and take the last answer back."""
+        """Forget what waits to be joined and what was seen; take the last answer back."""
         self.input.clear()
+        self.tracker.forget()
         if self.active:
             self.output.clear(self.now_ns(), self.config.target_frame)
         response.success, response.message = True, json.dumps({'objects': 0})

@@ -220,14 +220,30 @@ def test_empty_tables_are_answers_and_markers_go(chain):
     assert heard['objects/can/poses'][-1].poses == []
 
 
-def test_ids_are_never_used_twice(chain):
+def test_ids_stay_with_objects_until_they_are_reset(chain):
     stages, bench, send = chain
     heard = heard_answer(bench, stages)
-    for i in range(3):
+
+    def ids(chosen):
+        before = {topic: len(messages) for topic, messages in heard.items()}
+        stages.chosen = chosen
         send()
-        assert bench.spin(lambda: len(heard['objects/attributes']) == i + 1)
-    ids = np.concatenate([cloud_rows(m)['id'] for m in heard['objects/attributes']])
-    assert len(set(ids.tolist())) == 6
+        assert bench.spin(lambda: all(len(heard[topic]) > n for topic, n in before.items()))
+        return cloud_rows(heard['objects/attributes'][-1])['id'].tolist()
+
+    box, can = ids([0, 2])
+    assert ids([2, 0]) == [can, box]
+    # A viewer is told of what is gone, and of nothing else.
+    assert [m.action for m in heard['objects/markers'][-1].markers] == [Marker.ADD] * 2
+    assert ids([0]) == [box]
+    gone = [m for m in heard['objects/markers'][-1].markers if m.action == Marker.DELETE]
+    assert [(m.ns, m.id) for m in gone] == [('can', can)]
+    assert ids([2]) == [can]
+    labels = json.loads(heard['objects/labels'][-1].data)
+    assert labels['objects'] == {str(can): {'category': 'can', 'class_id': 3}}
+    assert bench.spin(call(bench, Trigger, 'reset').done)
+    bench.rest(0.3)
+    assert not {box, can} & set(ids([0, 2]))
 
 
 def call(bench, kind, name, **fields):

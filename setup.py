@@ -34,6 +34,7 @@ setup(
         ('share/' + NAME, ['package.xml']),
         ('share/' + NAME + '/config', glob('config/*.yaml')),
         ('share/' + NAME + '/launch', glob('launch/*.launch.py')),
+        ('share/' + NAME + '/examples', glob('examples/*.py')),
         *tree('bags'),
         *tree('models'),
     ],

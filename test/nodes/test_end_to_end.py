@@ -33,7 +33,8 @@ def bundle(request):
 
 @pytest.fixture(scope='module')
 def played(bundle):
-    """Return (Answer, Answer of a second play, what a late subscriber printed)."""
+    """Return (Answer, Answer of a second play, what two late subscribers printed)."""
+    from hooc_perception.models.folder import load_model_folder
     from hooc_perception.replay.bag_reader import BagScene
     from hooc_perception.supervisor import environment
     from hooc_perception.supervisor.bags import BagRunner, LISTENERS
@@ -53,12 +54,19 @@ def played(bundle):
             # No `hooc`, no package of ours: only the environment that says which domain.
             late = subprocess.Popen([sys.executable, '-I', str(HERE / 'late_subscriber.py')],
                                     stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-            supervisor.wait(lambda: late.poll() is not None, 40.0, 'it does not end')
+            surest = int(first.parsed.objects.score.argmax())
+            example = subprocess.Popen(
+                [sys.executable, '-I', str(HERE.parents[1] / 'examples' / 'pick_target.py'),
+                 load_model_folder(model).models[first.parsed.objects.category[surest] - 1].name,
+                 '--score', '0', '--max-age', '600'],
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            for process in (late, example):
+                supervisor.wait(lambda p=process: p.poll() is not None, 60.0, 'it does not end')
             second = runner.play(BagScene(bag))
     finally:
         os.environ.clear()
         os.environ.update(before)
-    return first, second, late.stdout.read()
+    return first, second, late.stdout.read(), example.stdout.read()
 
 
 def test_nodes_and_one_process_find_the_same_objects(bundle, played):
@@ -101,3 +109,12 @@ def test_a_late_subscriber_can_name_every_object(bundle, played):
     np.testing.assert_array_equal([t['translation'] for t in told], found.translation)
     np.testing.assert_array_equal(np.float32([t['size'] for t in told]), found.size)
     assert np.isfinite([t['score'] for t in told]).all()
+
+
+def test_the_example_of_a_planner_waits_above_the_surest_object(played):
+    target, found = json.loads(played[3]), played[0].parsed.objects
+    surest = int(found.score.argmax())
+    np.testing.assert_allclose(target['position'][:2], found.translation[surest, :2], atol=1e-6)
+    above = target['position'][2] - found.translation[surest, 2]
+    assert 0.1 < above < 0.1 + found.size[surest].max()
+    assert target['frame'] == 'table' and target['score'] == pytest.approx(found.score[surest])

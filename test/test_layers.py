@@ -42,7 +42,7 @@ ALLOWED = {
 # Message packages; tf2 and launch exist only on a ROS installation and stand behind guards.
 MESSAGES = {'action_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
             'lifecycle_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs',
-            'tf2_ros', 'visualization_msgs', 'ament_index_python'}
+            'tf2_ros', 'visualization_msgs', 'ament_index_python', 'shape_msgs'}
 for ros_layer in ('ros', 'nodes', 'supervisor'):
     ALLOWED[ros_layer] |= MESSAGES
 EXCEPTIONS = {

@@ -17,7 +17,9 @@ from hooc_perception.core.unexplained import unexplained_points
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
+from hooc_perception.ros.adapters.choose import AdapterConfig, adapters_of
 from hooc_perception.ros.detect_service import DetectService
+from hooc_perception.ros.found import found_scene
 from hooc_perception.ros.object_output import ObjectOutput
 from hooc_perception.ros.reproposal import MoreCandidates
 from hooc_perception.ros.spin import run_node
@@ -29,7 +31,7 @@ from std_srvs.srv import SetBool, Trigger
 
 
 @dataclass(frozen=True)
-class ParsingConfig(TrackConfig, StageConfig):
+class ParsingConfig(AdapterConfig, TrackConfig, StageConfig):
     """Parameters of the parsing node."""
 
     max_instances: int = param(-1, 'Objects of one category in a scene at most; 0 sets no '
@@ -64,7 +66,9 @@ class ParsingNode(StageNode):
             'poses': (PoseArray, 'candidates/poses'),
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set)
         self.more = MoreCandidates(self)
-        self.detect = DetectService(self)
+        self.detect = DetectService(self, lambda: None if self.enabled else (
+            'frame sets are ignored: call enable with true'))
+        self.adapters = adapters_of(self)
         self.owned(self.destroy_service, self.create_service(SetBool, 'enable', self.on_enable))
         self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
 
@@ -78,6 +82,12 @@ class ParsingNode(StageNode):
     def activate(self):
         """Say what the class ids mean."""
         self.output.announce()
+
+    def deactivate(self):
+        """Take back what other packages keep, and let nobody wait."""
+        self.detect.fail('the node was deactivated')
+        for adapter in self.adapters:
+            adapter.clear(self.now_ns(), self.config.target_frame)
 
     def on_set(self, stamp_ns, observation, messages):
         """Parse one frame set."""
@@ -97,15 +107,20 @@ class ParsingNode(StageNode):
         ids, objects = self.tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
         left = unexplained_points(observation, objects, self.models)
+        scene = found_scene(parsed, ids, self.models, stamp_ns, self.config.target_frame)
+        for adapter in self.adapters:
+            adapter.publish(scene)
         age_s = (self.now_ns() - stamp_ns) * 1e-9
         self.output.publish(parsed, ids, stamp_ns, self.config.target_frame, age_s, left)
-        self.detect.answer(stamp_ns, parsed, ids, self.models)
+        self.detect.answer(scene)
         self.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
                             energy=float(parsed.energy.total), age_s=age_s)
 
     def on_enable(self, request, response):
         """Let frame sets be parsed, or ignore them."""
         self.enabled = request.data
+        if not self.enabled:
+            self.detect.fail('frame sets are ignored from now on')
         response.success = True
         response.message = 'parsing' if self.enabled else 'frame sets are ignored'
         return response
@@ -115,7 +130,8 @@ class ParsingNode(StageNode):
         self.input.clear()
         self.tracker.forget()
         if self.active:
-            self.output.clear(self.now_ns(), self.config.target_frame)
+            for each in (*self.adapters, self.output):
+                each.clear(self.now_ns(), self.config.target_frame)
         response.success, response.message = True, json.dumps({'objects': 0})
         return response
 

@@ -4,10 +4,10 @@
 
 import colorsys
 import json
-import re
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.ros.conversions import header, pose_array_message
+from hooc_perception.ros.found import topic_token
 from hooc_perception.ros.point_clouds import cloud_message, row_dtype
 from hooc_perception.ros.stage_messages import (
     labels_json,
@@ -19,12 +19,6 @@ import numpy as np
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
-
-
-def topic_token(name):
-    """Return a name as a token that a topic may hold: letters, digits, underscores."""
-    token = re.sub(r'[^A-Za-z0-9_]', '_', name)
-    return f'_{token}' if token[:1].isdigit() else token
 
 
 class ObjectOutput:

@@ -112,8 +112,8 @@ def chain(bench, folder, monkeypatch):
                       and peer.count_subscribers(depth_topic) == 3)
     bench.rest(0.3)
 
-    def send():
-        stamp = peer.get_clock().now().nanoseconds
+    def send(shift_s=0.0):
+        stamp = peer.get_clock().now().nanoseconds + int(shift_s * 1e9)
         head = c.header(stamp, 'overhead_optical')
         infos.publish(c.camera_info_message(camera, head))
         images.publish(c.depth_message(stages.views[0].depth, head))
@@ -279,6 +279,63 @@ def test_detect_gives_up(chain):
     future = call(bench, Trigger, 'detect')
     assert bench.spin(future.done)
     assert not future.result().success and 'cameras' in future.result().message
+
+
+def test_detect_gives_up_while_simulated_time_stands_still(chain):
+    stages, bench, send = chain
+    from rclpy.parameter import Parameter
+    bench.chain[3].set_parameters([Parameter('detect_timeout_s', value=0.3),
+                                   Parameter('use_sim_time', value=True)])
+    future = call(bench, Trigger, 'detect')
+    assert bench.spin(future.done) and not future.result().success
+
+
+def test_detect_refuses_at_once_what_nobody_will_answer(chain):
+    stages, bench, send = chain
+    waiting = call(bench, Trigger, 'detect')
+    bench.rest(0.2)
+    assert bench.spin(call(bench, SetBool, 'enable', data=False).done)
+    assert bench.spin(waiting.done) and 'ignored' in waiting.result().message
+    future = call(bench, Trigger, 'detect')
+    assert bench.spin(future.done, 1.0)
+    assert not future.result().success and 'enable' in future.result().message
+    assert bench.spin(call(bench, SetBool, 'enable', data=True).done)
+    waiting = call(bench, Trigger, 'detect')
+    bench.rest(0.2)
+    bench.chain[3].trigger_deactivate()
+    assert bench.spin(waiting.done, 1.0) and 'deactivated' in waiting.result().message
+    assert bench.spin(call(bench, Trigger, 'detect').done, 1.0)
+
+
+def test_detect_survives_a_clock_that_is_set_back(chain):
+    stages, bench, send = chain
+    from rclpy.parameter import Parameter
+    bench.chain[0].set_parameters([Parameter('max_frame_age_s', value=0.0)])
+    heard = heard_answer(bench, stages)
+    send()
+    assert bench.spin(lambda: heard['objects/poses'])
+    future = call(bench, Trigger, 'detect')
+    bench.rest(0.2)
+    bench.chain[0].sent = None
+    send(-100.0)        # a bag that starts again
+    assert bench.spin(future.done)
+    assert future.result().success, future.result().message
+
+
+@pytest.mark.parametrize('parameter, value, package', [
+    ('publish_tf', True, 'tf2_msgs'), ('publish_detections', True, 'vision_msgs'),
+    ('planning_scene', 'box', 'moveit_msgs')])
+def test_packages_that_are_not_there_are_missed_when_configuring(bench, folder, parameter, value,
+                                                                 package):
+    try:
+        __import__(f'{package}.msg')
+        pytest.skip(f'{package} is installed')
+    except ImportError:
+        pass
+    node = bench.add(parsing_node.ParsingNode, model=str(folder.path), warm_up=False,
+                     **{parameter: value})
+    assert node.trigger_configure() == TransitionCallbackReturn.FAILURE
+    assert package in bench.reasons(node)['node'][1]
 
 
 def test_enable_and_reset(chain):

@@ -5,6 +5,7 @@
 from dataclasses import dataclass, field
 import json
 import os
+import time
 
 from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
@@ -56,6 +57,7 @@ class StageNode(LifecycleNode):
         """Declare all parameters; `kwargs` go to rclpy.node.Node."""
         super().__init__(name, **{'namespace': '/hooc', **kwargs})
         self.active = False
+        self.since = 0.0            # monotonic seconds of the last activation
         self._mine = []
         self.parameters = Parameters(self, self.is_unconfigured)
         self.diagnostics = Diagnostics(self)
@@ -142,6 +144,7 @@ class StageNode(LifecycleNode):
     def on_activate(self, state):
         """Let the publishers speak and the callbacks work."""
         def start():
+            self.since = time.monotonic()
             LifecycleNode.on_activate(self, state)
             self.activate()
             self.active = True

@@ -13,6 +13,7 @@ from hooc_perception.ros.conversions import (
     depth_from_message,
     depth_message,
     header,
+    labels_message,
     nanoseconds,
     transform_message,
 )
@@ -33,14 +34,22 @@ class ViewOutput:
                                                   f'views/{name}/{suffix}')
                                    for suffix, kind in _KINDS] for name in names}
         self._points = node.publisher(PointCloud2, 'views/points')
+        self._counts = {name: node.publisher(Image, 'views/<camera>/count', f'views/{name}/count')
+                        for name in names}
 
-    def publish(self, stamp_ns, target_frame, views, frames):
+    def publish(self, stamp_ns, target_frame, views, frames, counts=()):
         """
         Publish one frame set.
 
         :param views: RectifiedView a camera.
         :param frames: frame_id of each camera's optical frame.
+        :param counts: (H, W) uint8 readings that each pixel is the median of, None where
+            nothing was fused.
         """
+        for view, frame, count in zip(views, frames, counts):
+            if count is not None:
+                self._counts[view.camera.name].publish(
+                    labels_message(count, header(stamp_ns, frame)))
         for view, frame in zip(views, frames):
             head = header(stamp_ns, frame)
             info, extrinsics, depth = self._publishers[view.camera.name]

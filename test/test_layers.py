@@ -33,6 +33,7 @@ ALLOWED = {
               'hooc_perception.models.folder'},
     'benchmark': {'numpy', 'scipy', 'cv2', 'open3d', 'sklearn', 'manifold3d', 'trimesh',
                   'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.synthesis'},
+    'experiments': {'numpy', 'hooc_perception.evaluation', 'hooc_perception.scenes'},
     'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.scenes',
                   'hooc_perception.replay'},
     'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',

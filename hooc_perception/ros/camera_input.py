@@ -97,7 +97,7 @@ class CameraInput:
         for kind, suffix, callback in ((CameraInfo, 'camera_info', self._on_info),
                                        (Image, 'image_raw', self._on_image)):
             self._subscriptions.append(self.node.create_subscription(
-                kind, f'{self.name}/depth/{suffix}', callback,
+                kind, f'{self.name}/depth/{suffix}', self.node.guarded(callback),
                 qos(f'<camera>/depth/{suffix}', wanted),
                 qos_overriding_options=overridable(reliability=False)))
 

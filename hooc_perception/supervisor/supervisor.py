@@ -4,11 +4,13 @@
 
 from pathlib import Path
 import signal
+import sys
 import time
 
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.parameters import parameter_message
 from hooc_perception.supervisor.environment import isolate, use_large_segments
+from hooc_perception.supervisor.params_file import unreached_sections
 from hooc_perception.supervisor.processes import NodeProcess
 from hooc_perception.supervisor.shared_memory import free_orphans
 from lifecycle_msgs.msg import State, Transition
@@ -103,6 +105,9 @@ class Supervisor:
             self._claim = isolate()
         use_large_segments(len(self.names) + 1)
         free_orphans()
+        if self._params_file:
+            for sentence in unreached_sections(self._params_file, self.names, self.namespace):
+                print(f'[WARN] {sentence}', file=sys.stderr, flush=True)
         for name in self.names:
             self.start_process(name)
         self._context = rclpy.Context()

@@ -32,8 +32,8 @@ def bundle(request):
 
 
 @pytest.fixture(scope='module')
-def played(bundle):
-    """Return (Answer, Answer of a second play, what two late subscribers printed)."""
+def played(bundle, tmp_path_factory):
+    """Return (Answer, Answer of a second play, prints of two late subscribers, recording)."""
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.replay.bag_reader import BagScene
     from hooc_perception.supervisor import environment
@@ -62,11 +62,13 @@ def played(bundle):
                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
             for process in (late, example):
                 supervisor.wait(lambda p=process: p.poll() is not None, 60.0, 'it does not end')
+            runner._record = tmp_path_factory.mktemp('bags') / 'out'
             second = runner.play(BagScene(bag))
     finally:
         os.environ.clear()
         os.environ.update(before)
-    return first, second, late.stdout.read(), example.stdout.read()
+    return (first, second, late.stdout.read(), example.stdout.read(),
+            runner._record / BagScene(bag).name)
 
 
 def test_nodes_and_one_process_find_the_same_objects(bundle, played):
@@ -118,3 +120,27 @@ def test_the_example_of_a_planner_waits_above_the_surest_object(played):
     above = target['position'][2] - found.translation[surest, 2]
     assert 0.1 < above < 0.1 + found.size[surest].max()
     assert target['frame'] == 'table' and target['score'] == pytest.approx(found.score[surest])
+
+
+def test_a_recording_holds_the_answer_and_is_a_bag_like_any_other(bundle, played):
+    from hooc_perception.replay.bag_reader import BagScene
+    from mcap.reader import make_reader
+    from rosbags.typesys import get_typestore, Stores
+    store, last, counts = get_typestore(Stores.ROS2_JAZZY), {}, {}
+    file, = played[4].glob('*.mcap')
+    with open(file, 'rb') as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            counts[channel.topic] = counts.get(channel.topic, 0) + 1
+            last[channel.topic] = store.deserialize_cdr(message.data, schema.name)
+    found = played[1].parsed.objects
+    assert counts['/hooc/objects/poses'] == 1       # not what was latched of the scene before
+    poses = last['/hooc/objects/poses'].poses
+    np.testing.assert_array_equal(
+        [(p.position.x, p.position.y, p.position.z) for p in poses], found.translation)
+    assert last['/hooc/objects/attributes'].width == len(found)
+    assert json.loads(last['/hooc/scene/summary'].data)['stamp_ns'] == played[1].stamp_ns
+    for topic in ('pixels/probabilities', 'candidates/poses', 'objects/markers',
+                  'objects/labels', 'scene/unexplained'):
+        assert f'/hooc/{topic}' in counts, topic
+    for mine, theirs in zip(BagScene(played[4]).views(), BagScene(bundle[0]).views()):
+        np.testing.assert_array_equal(mine.depth, theirs.depth)

@@ -210,7 +210,7 @@ def scene_tables(scores):
         rows.append(['mean', *(r['mean'][c] for r in results.values() for c, _ in columns)])
         header = ['scene', *(f'`{row}` {short}' for row in results for _, short in columns)]
         if len(names) == len(paper.SCENES):
-            header += ['HOOC', *(f'paper {short}' for _, short in columns)]
+            header += ['HOOC', *(f'HOOC {short}' for _, short in columns)]
             for k, (row, name) in enumerate(zip(rows, (*paper.SCENES, 'mean'))):
                 row += [name, *(paper.SCORES[setting][c][k] if k < len(names)
                                 else paper.mean(setting, c) for c, _ in columns)]

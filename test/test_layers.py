@@ -33,7 +33,9 @@ ALLOWED = {
     'nodes': {'numpy', 'rclpy', 'hooc_perception.core', 'hooc_perception.ros',
               'hooc_perception.models.folder'},
     'benchmark': {'numpy', 'scipy', 'cv2', 'open3d', 'sklearn', 'manifold3d', 'trimesh',
-                  'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.synthesis'},
+                  'rclpy', 'psutil', 'matplotlib', 'hooc_perception.core',
+                  'hooc_perception.replay', 'hooc_perception.diagnosis', 'hooc_perception.ros',
+                  'hooc_perception.supervisor', 'hooc_perception.models', 'hooc_perception.synthesis'},
     'experiments': {'numpy', 'hooc_perception.evaluation', 'hooc_perception.scenes'},
     'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.scenes',
                   'hooc_perception.replay'},
@@ -45,7 +47,7 @@ ALLOWED = {
 MESSAGES = {'action_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
             'lifecycle_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs',
             'tf2_ros', 'visualization_msgs', 'ament_index_python', 'shape_msgs'}
-for ros_layer in ('ros', 'nodes', 'supervisor'):
+for ros_layer in ('ros', 'nodes', 'supervisor', 'benchmark'):
     ALLOWED[ros_layer] |= MESSAGES
 EXCEPTIONS = {
     ('nodes/replay_node.py', 'hooc_perception.replay'),

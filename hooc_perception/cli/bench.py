@@ -19,11 +19,16 @@ def add_arguments(parser):
     parser.add_argument('--model', type=Path, metavar='MODEL',
                         help='time the whole chain with this model, too, stage by stage')
     parser.add_argument('--json', type=Path, metavar='FILE', help='write all figures as JSON')
+    parser.add_argument('--fuzz', type=int, metavar='N',
+                        help='instead: feed N damaged bags and messages to all that reads them; '
+                             'each has to be read or refused in one sentence')
     parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
 
 
 def run(args):
     """Run the command; return the exit code."""
+    if args.fuzz is not None:
+        return _fuzz(args.fuzz, args.seed)
     from hooc_perception.benchmark import learning, parsing, rendering
     from hooc_perception.benchmark.measure import hold
     from hooc_perception.benchmark.scene import bench_scene
@@ -63,6 +68,24 @@ def run(args):
         content = _content(entries, quality, times, args.seed)
         args.json.write_text(json.dumps(content, indent=1) + '\n')
         print(args.json)
+
+
+def _fuzz(cases, seed):
+    """Run the fuzzer, print what came of it; return the exit code."""
+    from hooc_perception.benchmark.fuzz import fuzz, READ, REFUSED
+    from hooc_perception.evaluation.tables import Table, to_text
+    from tqdm import tqdm
+    if cases < 1:
+        raise HoocError(f'--fuzz is {cases}; give the number of cases')
+    result = fuzz(cases, seed, lambda numbers: tqdm(numbers, desc='cases', disable=None))
+    kinds = sorted({kind for kind, _ in result.outcomes})
+    rows = tuple((kind, str(result.outcomes[kind, READ]), str(result.outcomes[kind, REFUSED]))
+                 for kind in kinds)
+    print(to_text(Table('Damaged input', ('', 'read', 'refused'), rows, (
+        f'{cases} cases of seed {seed}; {len(result.failures)} failed.',))))
+    for number, kind, text in result.failures:
+        print(f'case {number} ({kind}): {text}')
+    return int(bool(result.failures))
 
 
 def _print(entries, quality):

@@ -95,9 +95,10 @@ class ParsingNode(StageNode):
             return
         start = time.monotonic()
         try:
+            n = len(self.models)
             parsed = parse(
-                observation, probabilities_from_message(messages['probabilities']),
-                candidates_from_messages(messages['poses'], messages['attributes']),
+                observation, probabilities_from_message(messages['probabilities'], observation, n),
+                candidates_from_messages(messages['poses'], messages['attributes'], n),
                 self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
                 self.max_instances, self.more.asker(stamp_ns, self.config.more_timeout_s))
         except HoocError as error:

@@ -74,7 +74,8 @@ def _salvage_database(path):
                     topic, kind, latched = topics[row[0]]
                     found.messages.append((topic, kind, bytes(row[2]), int(row[1]), latched))
     except (sqlite3.Error, TypeError, ValueError) as error:
-        found.notes.append(f'the database cannot be read further ({error})')
+        reason = ' '.join(str(error).split())[:120]
+        found.notes.append(f'the database cannot be read further ({reason})')
     return found
 
 

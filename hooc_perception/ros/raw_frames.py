@@ -4,6 +4,7 @@
 
 from collections import deque
 from dataclasses import dataclass
+import textwrap
 
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.core.fuse import fuse_depth, has_moved
@@ -123,11 +124,11 @@ class RawFrames:
 
 
 def _refusing(code, function, *args):
-    """Return function(*args); a HoocError becomes a FrameRefused."""
+    """Return function(*args); a HoocError becomes a FrameRefused, of bearable length."""
     try:
         return function(*args)
     except HoocError as error:
-        raise FrameRefused(code, str(error)) from error
+        raise FrameRefused(code, textwrap.shorten(str(error), 500, placeholder=' ...')) from error
 
 
 def _refuse(code, trouble, before=''):

@@ -1,7 +1,7 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Feed damaged bags and messages to everything that reads them.
+Feed damaged bags, messages and models to everything that reads them.
 
 Each case is drawn from its number alone and runs in a process that may neither crash, nor
 hang, nor fill the memory: it is read, or refused in one sentence.
@@ -18,6 +18,7 @@ import tempfile
 import time
 
 from hooc_perception.benchmark.fuzz_bags import bag_cases
+from hooc_perception.benchmark.fuzz_models import model_cases
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.errors import HoocError
 
@@ -93,7 +94,7 @@ def run_case(number, seed, kinds, folder):
 
 def kinds_of_cases():
     """Return {name: function(rng, folder)} of all kinds of cases that can run here."""
-    kinds = dict(bag_cases())
+    kinds = {**bag_cases(), **model_cases()}
     try:
         from hooc_perception.benchmark.fuzz_messages import message_cases
         kinds.update(message_cases())

@@ -84,3 +84,30 @@ def odd_number(value, rng):
 def odd_text(rng):
     """Return a text that nobody expects."""
     return ODD_TEXTS[rng.integers(len(ODD_TEXTS))]
+
+
+def odd_array(array, rng):
+    """Return an array with odd numbers in it, and now and then another shape or type."""
+    array = np.array(array)
+    if not array.size:
+        return array
+    flat = array.reshape(-1)
+    where = rng.integers(len(flat), size=int(rng.integers(1, 50)))
+    with np.errstate(all='ignore'):
+        if array.dtype.kind in 'iu':
+            info = np.iinfo(array.dtype)
+            odd = [info.min, info.max, 0, 1, info.max // 2, min(len(flat), info.max)]
+            flat[where] = rng.choice(odd, size=len(where)).astype(array.dtype)
+        elif array.dtype.kind == 'f':
+            flat[where] = rng.choice([np.nan, np.inf, -np.inf, 1e30, -1e30, 0, 1e-30],
+                                     size=len(where))
+        array, way = flat.reshape(array.shape), rng.integers(6)
+        if way == 0 and array.ndim:
+            array = array[:len(array) // 2]
+        elif way == 1 and array.ndim:
+            array = np.concatenate([array, array])
+        elif way == 2 and array.ndim > 1:
+            array = np.ascontiguousarray(array[..., :-1])
+        elif way == 3:
+            array = array.astype(rng.choice(['f4', 'f8', 'i4', 'i8', 'u1', 'u2', '?']))
+    return array

@@ -20,8 +20,8 @@ def add_arguments(parser):
                         help='time the whole chain with this model, too, stage by stage')
     parser.add_argument('--json', type=Path, metavar='FILE', help='write all figures as JSON')
     parser.add_argument('--fuzz', type=int, metavar='N',
-                        help='instead: feed N damaged bags and messages to all that reads them; '
-                             'each has to be read or refused in one sentence')
+                        help='instead: feed N damaged bags, messages and models to all '
+                             'that reads them; each has to be read or refused in one sentence')
     parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
 
 

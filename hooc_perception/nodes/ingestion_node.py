@@ -63,6 +63,7 @@ class IngestionNode(StageNode):
         self.sets = FrameSets(self.names, self.config)
         self.frames = {name: RawFrames(name) for name in self.names}
         self.sent = None            # (stamp, monotonic s) of the set that is not answered yet
+        self.number = 0             # of sets that went out
         self.table_seen = -LOOK_FOR_TABLE_S
         self.output = ViewOutput(self, self.names)
         self.subscription(PoseArray, 'objects/poses', self.on_answer)
@@ -149,8 +150,9 @@ class IngestionNode(StageNode):
         frames = [(frame and frame.frame_id) or f'{name}_optical_frame'
                   for name, frame in zip(self.names, frame_set.frames)]
         self.output.publish(frame_set.stamp_ns, self.config.target_frame, views, frames, counts)
-        self.diagnostics.ok('views', stamp_ns=frame_set.stamp_ns, cameras=len(views) - sum(
-            frame is None for frame in frame_set.frames))
+        self.number += 1
+        there = sum(frame is not None for frame in frame_set.frames)
+        self.diagnostics.ok('views', stamp_ns=frame_set.stamp_ns, sets=self.number, cameras=there)
         self.look_for_table(views, frame_set)
 
     def rectified(self, frame_set):

@@ -76,6 +76,7 @@ class FrameSets:
     def __init__(self, cameras, config):
         self.cameras, self.config = tuple(cameras), config
         self.drops = Counter()          # (camera, reason) -> number
+        self.used = Counter()           # camera -> frames that went out in sets
         self._told = Counter()          # what new_drops has given out already
         self._latest = {}               # camera -> (stamp_ns, frame), unused
         self._last_stamp = {}           # camera -> stamp_ns, used or not
@@ -124,13 +125,13 @@ class FrameSets:
         """
         Return the FrameSet of one unused frame from every camera, or None while there is none.
 
-        Frames that have grown too old or lie too far from the newest are dropped (`stale`,
+        Frames that have grown too old or lie too far from the newest are dropped (`expired`,
         `spread`): their cameras have to deliver again. Cameras that are lost are not waited for.
         """
         self._watch_clock(now_ns)
         for camera in list(self._latest):
             if self._too_old(self._latest[camera][0], now_ns):
-                self._drop(camera, 'stale')
+                self._drop(camera, 'expired')
                 del self._latest[camera]
         if not self._latest:
             return None
@@ -153,6 +154,7 @@ class FrameSets:
         for camera in self._latest:
             self._missed.pop(camera, None)
             self.lost.pop(camera, None)
+        self.used.update(self._latest.keys())
         self._latest.clear()
         return FrameSet(min(frame[0] for frame in frames if frame),
                         tuple(frame and frame[1] for frame in frames))

@@ -93,10 +93,10 @@ def test_old_frames_are_stale_at_once():
     assert assembly.drops == {(camera, 'stale'): 1 for camera in 'abc'}
 
 
-def test_frames_grow_stale_while_they_wait():
+def test_frames_expire_while_they_wait():
     assembly = sets(max_frame_age_s=0.5, max_set_spread_s=10.0)
     assert feed(assembly, 'a 0', 'b 0', 'c 700') == []
-    assert assembly.drops == {('a', 'stale'): 1, ('b', 'stale'): 1}
+    assert assembly.drops == {('a', 'expired'): 1, ('b', 'expired'): 1}
 
 
 def test_age_zero_accepts_any_age():

@@ -3,13 +3,24 @@
 
 HOOC := .venv/bin/hooc
 PYTEST_ARGS ?=
+# Of `make results`: which sets (DEV and OSD are folders), which rows, what to keep or to force.
+RESULTS ?= results
+SETS ?= twin
+DEV ?=
+OSD ?=
+ROWS ?= paper best fast fpfh ppf
+KEEP ?=
+FORCE ?=
+JOBS ?= 0
 
-.PHONY: help setup demo test bundle lint lock clean
+.PHONY: help setup demo test results bundle lint lock clean
 
 help:
 	@echo 'make demo    set up if need be, then find the objects of the bundled scene'
 	@echo 'make test    set up if need be, then run every test (PYTEST_ARGS="-k name" for some)'
 	@echo 'make setup   only set up'
+	@echo 'make results recompute the tables of docs/results.md: DEV=folder OSD=folder for more sets,'
+	@echo '             ROWS="best fast", KEEP="paper fpfh ppf", FORCE="best", RESULTS=folder, JOBS=1'
 	@echo 'make bundle  make the bundled scene and model again'
 	@echo 'make lint    check the style'
 	@echo 'make lock    resolve requirements.in again (PYTHONS="python3.11 python3.12")'
@@ -22,6 +33,11 @@ demo: setup
 
 test: setup
 	@.venv/bin/python -m pytest $(PYTEST_ARGS)
+
+results: setup
+	@.venv/bin/python -m hooc_perception.experiments --out $(RESULTS) \
+	  $(addprefix --set ,$(SETS) $(if $(DEV),dev=$(DEV)) $(if $(OSD),osd=$(OSD))) \
+	  --rows $(ROWS) $(if $(KEEP),--keep $(KEEP)) $(if $(FORCE),--force $(FORCE)) --jobs $(JOBS)
 
 bundle: setup
 	@$(HOOC) demo --make-bundle

@@ -32,8 +32,9 @@ setup(
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),
-        ('share/' + NAME + '/config', glob('config/*.yaml')),
+        ('share/' + NAME + '/config', glob('config/*')),
         ('share/' + NAME + '/launch', glob('launch/*.launch.py')),
+        ('share/' + NAME + '/examples', glob('examples/*')),
         *tree('bags'),
         *tree('models'),
     ],

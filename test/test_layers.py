@@ -18,7 +18,8 @@ ALLOWED = {
                'pyrender', 'OpenGL', 'hooc_perception.core'},
     'scenes': {'numpy', 'scipy', 'yaml', 'cv2', 'trimesh', 'hooc_perception.core',
                'hooc_perception.models.mesh'},
-    'replay': {'numpy', 'scipy', 'yaml', 'cv2', 'rosbags', 'hooc_perception.core',
+    'replay': {'numpy', 'scipy', 'yaml', 'cv2', 'rosbags', 'mcap', 'lz4', 'zstandard',
+               'hooc_perception.core',
                'hooc_perception.scenes'},
     'synthesis': {'numpy', 'scipy', 'numba', 'yaml', 'cv2', 'fcl', 'mujoco', 'trimesh',
                   'manifold3d', 'open3d', 'joblib', 'tqdm',
@@ -32,7 +33,11 @@ ALLOWED = {
     'nodes': {'numpy', 'rclpy', 'hooc_perception.core', 'hooc_perception.ros',
               'hooc_perception.models.folder'},
     'benchmark': {'numpy', 'scipy', 'cv2', 'open3d', 'sklearn', 'manifold3d', 'trimesh',
-                  'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.synthesis'},
+                  'rclpy', 'psutil', 'matplotlib', 'hooc_perception.core',
+                  'hooc_perception.replay', 'hooc_perception.diagnosis', 'hooc_perception.ros',
+                  'hooc_perception.supervisor', 'hooc_perception.models',
+                  'hooc_perception.synthesis'},
+    'experiments': {'numpy', 'hooc_perception.evaluation', 'hooc_perception.scenes'},
     'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.scenes',
                   'hooc_perception.replay'},
     'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',
@@ -42,8 +47,8 @@ ALLOWED = {
 # Message packages; tf2 and launch exist only on a ROS installation and stand behind guards.
 MESSAGES = {'action_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',
             'lifecycle_msgs', 'rcl_interfaces', 'sensor_msgs', 'std_msgs', 'std_srvs', 'tf2_msgs',
-            'tf2_ros', 'visualization_msgs', 'ament_index_python'}
-for ros_layer in ('ros', 'nodes', 'supervisor'):
+            'tf2_ros', 'visualization_msgs', 'ament_index_python', 'shape_msgs'}
+for ros_layer in ('ros', 'nodes', 'supervisor', 'benchmark'):
     ALLOWED[ros_layer] |= MESSAGES
 EXCEPTIONS = {
     ('nodes/replay_node.py', 'hooc_perception.replay'),

@@ -19,11 +19,25 @@ def add_arguments(parser):
     parser.add_argument('--model', type=Path, metavar='MODEL',
                         help='time the whole chain with this model, too, stage by stage')
     parser.add_argument('--json', type=Path, metavar='FILE', help='write all figures as JSON')
+    parser.add_argument('--fuzz', type=int, metavar='N',
+                        help='instead: feed N damaged bags, messages and models to all '
+                             'that reads them; each has to be read or refused in one sentence')
+    parser.add_argument('--soak', type=float, metavar='MINUTES',
+                        help='instead: run the nodes at 1 Hz for so long while cameras drop out '
+                             'and return, and look whether their memory stays flat')
+    parser.add_argument('--bag', type=Path, metavar='BAG',
+                        help='scene for --soak (default: the bundled one)')
+    parser.add_argument('--plot', type=Path, metavar='FILE.png',
+                        help='draw the memory of the processes of --soak over time')
     parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
 
 
 def run(args):
     """Run the command; return the exit code."""
+    if args.fuzz is not None:
+        return _fuzz(args.fuzz, args.seed)
+    if args.soak is not None:
+        return _soak(args)
     from hooc_perception.benchmark import learning, parsing, rendering
     from hooc_perception.benchmark.measure import hold
     from hooc_perception.benchmark.scene import bench_scene
@@ -63,6 +77,77 @@ def run(args):
         content = _content(entries, quality, times, args.seed)
         args.json.write_text(json.dumps(content, indent=1) + '\n')
         print(args.json)
+
+
+def _fuzz(cases, seed):
+    """Run the fuzzer, print what came of it; return the exit code."""
+    from hooc_perception.benchmark.fuzz import fuzz, READ, REFUSED
+    from hooc_perception.evaluation.tables import Table, to_text
+    from tqdm import tqdm
+    if cases < 1:
+        raise HoocError(f'--fuzz is {cases}; give the number of cases')
+    result = fuzz(cases, seed, lambda numbers: tqdm(numbers, desc='cases', disable=None))
+    kinds = sorted({kind for kind, _ in result.outcomes})
+    rows = tuple((kind, str(result.outcomes[kind, READ]), str(result.outcomes[kind, REFUSED]))
+                 for kind in kinds)
+    print(to_text(Table('Damaged input', ('', 'read', 'refused'), rows, (
+        f'{cases} cases of seed {seed}; {len(result.failures)} failed.',))))
+    for number, kind, text in result.failures:
+        print(f'case {number} ({kind}): {text}')
+    return int(bool(result.failures))
+
+
+def _soak(args):
+    """Run the nodes for a long time, print and draw their memory; return the exit code."""
+    from hooc_perception.benchmark.soak import soak, write_plot
+    from hooc_perception.cli.demo import bundle_root, MODEL, SCENE
+    from hooc_perception.models.folder import load_model_folder
+    from hooc_perception.supervisor.supervisor import CHAIN
+    from tqdm import tqdm
+    if not 0 < args.soak <= 1e5:
+        raise HoocError(f'--soak is {args.soak:g}; give the minutes that it may take')
+    bag, model = args.bag or bundle_root() / SCENE, args.model or bundle_root() / MODEL
+    load_model_folder(model)
+    parameters = {name: {'model': str(Path(model).resolve()), 'seed': args.seed}
+                  for name in CHAIN}
+    with tqdm(total=round(60 * args.soak), desc='seconds', disable=None) as bar:
+        result = soak(bag, parameters, 60 * args.soak, seed=args.seed,
+                      progress=lambda done: bar.update(int(done) - bar.n))
+    flat = _print_soak(result)
+    if args.plot:
+        write_plot(args.plot, result)
+        print(args.plot)
+    if args.json:
+        args.json.write_text(json.dumps({
+            'format': 'hooc-soak/1', 'minutes': args.soak, 'frames': result.frames,
+            'sets': result.sets, 'answers': result.answers, 'deaths': result.deaths,
+            'seconds': result.seconds.round(1).tolist(),
+            'memory_mb': {n: m.round(1).tolist() for n, m in result.memory_mb.items()},
+            'reasons': {f'{thing} {reason}': number
+                        for (thing, reason), number in sorted(result.reasons.items())}}) + '\n')
+        print(args.json)
+    return int(not flat or result.deaths > 0)
+
+
+def _print_soak(result, allowed=0.05):
+    """Print what a soak has shown; return whether no process grew by more than a share."""
+    from hooc_perception.evaluation.tables import Table, to_text
+    import numpy as np
+    rows, flat = [], True
+    for name, memory in result.memory_mb.items():
+        grown = result.growth_mb(name)
+        flat &= grown <= max(20.0, allowed * float(np.nanmedian(memory)))
+        rows.append((name, f'{memory[0]:.0f}', f'{np.nanmax(memory):.0f}', f'{memory[-1]:.0f}',
+                     f'{grown:+.1f}', f'{result.growth_mb_an_hour(name):+.1f}'))
+    reasons = ', '.join(f'{thing.partition(": ")[2]} {reason} {number}' for (thing, reason), number
+                        in sorted(result.reasons.items()))
+    print(to_text(Table(
+        f'Memory over {result.seconds[-1] / 60:.1f} minutes, MB',
+        ('', 'first', 'most', 'last', 'grown', 'an hour'), tuple(rows),
+        (f'{result.frames} images, {result.sets} frame sets, {result.answers} answered, '
+         f'{result.deaths} deaths. Counted: {reasons}.',
+         'Grown: median of the last quarter over that of the first after warming up.'))))
+    return flat
 
 
 def _print(entries, quality):

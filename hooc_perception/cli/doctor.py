@@ -4,6 +4,8 @@
 
 from pathlib import Path
 
+from hooc_perception.errors import HoocError
+
 HELP = ('Check this installation or, where bags are named, those bags, and say in one sentence '
         'each what is wrong and how to mend it. The exit code is 1 where something will not work.')
 
@@ -12,17 +14,31 @@ def add_arguments(parser):
     """Declare the arguments."""
     parser.add_argument('bags', metavar='BAG', nargs='*', type=Path,
                         help='bag to check: a rosbag2 folder or an .mcap or .db3 file')
+    parser.add_argument('--model', type=Path, metavar='MODEL',
+                        help='also say whether this model fits the cameras of the bags')
+    parser.add_argument('--salvage', type=Path, metavar='NEW_BAG',
+                        help='write what can be read of one damaged bag to a new one, check that')
 
 
 def run(args):
     """Run the command; return the exit code."""
     from hooc_perception.diagnosis.finding import ERROR, worst
     findings = []
+    if args.salvage and len(args.bags) != 1:
+        raise HoocError('--salvage takes one bag; name it')
+    if args.model and not args.bags:
+        raise HoocError('--model is held against bags; name one')
+    if args.salvage:
+        args.bags = [_salvage(args.bags[0], args.salvage)]
     if args.bags:
-        from hooc_perception.diagnosis.bag import check_bag
+        from hooc_perception.diagnosis.bag import check_bag, check_rig
+        from hooc_perception.models.folder import load_model_folder
+        model = load_model_folder(args.model) if args.model else None
         for path in args.bags:
             print(path)
             findings += _show(check_bag(path))
+            if model:
+                findings += _show(check_rig(path, model))
     else:
         from hooc_perception.diagnosis.installation import check_installation
         findings = _show(check_installation())
@@ -30,6 +46,19 @@ def run(args):
     print(f'{counts["error"]} errors, {counts["warning"]} warnings'
           + ('' if any(counts.values()) else ': all is well'))
     return int(worst(findings) == ERROR)
+
+
+def _salvage(path, out):
+    """Write what can be read of a bag to a new one; return the latter."""
+    from hooc_perception.replay.salvage import salvaged, write_salvaged
+    found = salvaged(path)
+    for note in dict.fromkeys(found.notes):
+        print(f'  {note}')
+    if not found.messages:
+        raise HoocError(f'{path}: no message can be read any more; record again')
+    write_salvaged(found, out)
+    print(f'{out}: {len(found.messages)} messages saved')
+    return out
 
 
 def _show(findings):

@@ -94,7 +94,7 @@ def _baseline(args, scene_set, models):
 
 def _tables(evaluations, scene_set, visibility, truth_energy, stages):
     """Return every table that the inputs give."""
-    from hooc_perception.evaluation import paper_tables
+    from hooc_perception.evaluation import paper_tables, stage_tables
 
     tables = [paper_tables.visibility_summary(visibility)] if visibility else []
     tables += [paper_tables.score_table(evaluations, setting) for setting in 'AB']
@@ -107,7 +107,8 @@ def _tables(evaluations, scene_set, visibility, truth_energy, stages):
             tables.append(paper_tables.category_table(e, scene_set.category_names))
         tables.append(paper_tables.mask_table(e))
     if stages:
-        tables.append(paper_tables.stage_table(stages))
+        tables.append(stage_tables.stage_table(stages))
+        tables.append(stage_tables.stage_category_table(stages, scene_set.category_names))
     return [table for table in tables if table]
 
 

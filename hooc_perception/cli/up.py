@@ -31,6 +31,7 @@ def run(args):
     """Run the command until it is interrupted."""
     from hooc_perception.cli.run import chain_parameters
     from hooc_perception.models.folder import load_model_folder
+    from hooc_perception.supervisor.keeper import Keeper
     from hooc_perception.supervisor.supervisor import CHAIN, Supervisor
     model = load_model_folder(args.model)
     parameters = chain_parameters(args, args.profile or model.profile,
@@ -49,8 +50,9 @@ def run(args):
             up = True
             print(f'the nodes are up; objects come on {args.namespace.rstrip("/")}/objects/poses; '
                   'end with Ctrl-C', flush=True)
+            keeper = Keeper(supervisor)
             while True:
-                supervisor.spin(0.5)
+                keeper.spin(0.2)
     except KeyboardInterrupt:
         # The way to end this command; an interrupt before it was up is one.
         if not up:

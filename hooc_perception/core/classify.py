@@ -46,7 +46,9 @@ def classify(observation, classifier, config=ClassifyConfig()):
     try:
         kind, version = int(classifier['kind']), int(classifier['version'])
         n_columns = int(classifier['classes']) + 1
-    except (KeyError, TypeError, ValueError) as e:
+        if kind == KIND_PAPER:
+            int(classifier['views'])
+    except (KeyError, TypeError, ValueError, OverflowError) as e:
         raise HoocError(f'the classifier is not one of ours ({e}); train the model again')
     if version != FORMAT_VERSION or kind not in (KIND_PAPER, KIND_FUSED):
         raise HoocError(f'the classifier has format {version}, kind {kind}; this program reads '

@@ -60,11 +60,15 @@ class Forest:
                                   np.int32, np.float32, np.int32, np.int32, np.int32, np.uint8))))
         except KeyError as missing:
             raise HoocError(f'the classifier has no array {missing}; train the model again')
-        n = len(forest.feature)
+        except (ValueError, TypeError):
+            raise HoocError('the classifier holds texts for numbers; train the model again')
+        n = forest.feature.size
+        rows = forest.feature, forest.threshold, forest.left, forest.leaf
+        if any(row.shape != (n,) for row in rows) or forest.roots.ndim != 1:
+            raise HoocError('the classifier holds a damaged forest; train the model again')
         inner = forest.feature >= 0
         children = forest.left[inner]
         ok = (forest.leaf_p.ndim == 2 and len(forest.roots) > 0
-              and len(forest.threshold) == len(forest.left) == len(forest.leaf) == n
               and _within(forest.roots, n) and _within(forest.leaf[~inner], len(forest.leaf_p))
               and (children > np.nonzero(inner)[0]).all() and _within(children + 1, n))
         if not ok:

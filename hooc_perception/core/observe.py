@@ -71,15 +71,17 @@ def observe(views, config=ObserveConfig()):
     Set rectified views against the empty table.
 
     :param views: sequence of RectifiedView in camera order; world z = 0 is the table top.
+        A view without any reading stands for a camera that has dropped out: it shows nothing
+        and rules nothing out.
     :return: Observation; pure and deterministic in its input.
     :raises HoocError: where no view holds any reading.
     """
     if not views:
         raise HoocError('there is no depth image to look at; give at least one camera')
-    for view in views:
-        if not np.isfinite(view.depth).any():
-            raise HoocError(f'the depth image of camera {view.camera.name} holds no reading '
-                            'at all (every pixel is 0 or NaN); check the sensor and the unit')
+    if not any(np.isfinite(view.depth).any() for view in views):
+        raise HoocError(f'the depth image of camera {views[0].camera.name} holds no reading '
+                        'at all (every pixel is 0 or NaN), nor does any other; check the '
+                        'sensors and the unit')
     fits = [_level(view, config) for view in views]
     noise = [sigma for _, sigma in fits if np.isfinite(sigma)]
     noise_m = float(np.clip(np.median(noise), 0.0005, 0.02)) if noise else 0.003

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The method in one screen: from depth images to the objects on the table."""
 
+from dataclasses import replace
 import time
 
 from hooc_perception.core.classify import classify
@@ -9,6 +10,7 @@ from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe, rectify
 from hooc_perception.core.parse import parse
 from hooc_perception.core.propose import propose, propose_more
+from hooc_perception.core.symmetry import canonical_objects
 from hooc_perception.core.verify import Verifier
 
 
@@ -52,7 +54,8 @@ class Pipeline:
             pool = change_pool(pool)
         scene = parse(observation, probabilities, pool, self.models, p.parse, self.rng('parse'),
                       self.max_instances, self.more(observation, probabilities), self.verifier)
-        return scene.timed(**seconds)
+        return replace(scene, objects=canonical_objects(scene.objects, self.models)).timed(
+            **seconds)
 
     def more(self, observation, probabilities):
         """Return the re-proposal that `parse` calls each round."""

@@ -12,6 +12,7 @@ doing without it.
 
 from hooc_perception.core.forest import Forest
 from hooc_perception.core.kernels import explain as kernel
+from hooc_perception.errors import HoocError
 import numpy as np
 
 FEATURES = (
@@ -34,10 +35,18 @@ class Verifier:
 
     @staticmethod
     def from_arrays(classifier):
-        """Return the Verifier of a classifier's arrays, None where training made none."""
+        """
+        Return the Verifier of a classifier's arrays, None where training made none.
+
+        :raises HoocError: where it asks for other features than this version computes.
+        """
         if 'verifier_feature' not in classifier:
             return None
-        return Verifier(Forest.from_arrays(classifier, 'verifier_'))
+        forest = Forest.from_arrays(classifier, 'verifier_')
+        if (forest.feature.max() >= len(FEATURES) or forest.leaf_p.shape[1] != 2
+                or int(classifier.get('verifier_features', 0)) != len(FEATURES)):
+            raise HoocError('the verifier of the model does not fit this version; train again')
+        return Verifier(forest)
 
     def probability(self, x):
         """Return (n,) float64 for feature rows x (n, FEATURES) float32."""

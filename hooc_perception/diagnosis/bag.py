@@ -5,13 +5,16 @@
 from collections import defaultdict
 from dataclasses import dataclass, field
 
+from hooc_perception.core.classify import KIND_PAPER
 from hooc_perception.core.depth_encodings import decode_depth
 from hooc_perception.core.observe import observe, ObserveConfig, rectify
+from hooc_perception.core.plausible import NEAREST_M, rig_trouble
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING
 from hooc_perception.errors import HoocError
 from hooc_perception.replay.bag_files import iter_messages, topics
 from hooc_perception.replay.bag_reader import BagScene
 from hooc_perception.replay.camera_topics import camera_from_info, depth_topics
+from hooc_perception.replay.salvage import salvaged
 import numpy as np
 
 IMAGE, INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'
@@ -44,6 +47,7 @@ def check_bag(path):
         firsts, infos, streams = read_streams(path, known)
     except HoocError as error:
         yield Finding(ERROR, 'bag', str(error))
+        yield from check_remains(path)
         return
     yield Finding(OK, 'bag', f'{sum(t.count for t in known.values())} messages on '
                   f'{len(known)} topics')
@@ -66,6 +70,35 @@ def check_bag(path):
     yield from check_latched(known)
     if sound:
         yield from check_geometry(path)
+
+
+def check_remains(path):
+    """Yield what can still be read of a damaged bag."""
+    try:
+        found = salvaged(path)
+    except HoocError as error:
+        yield Finding(ERROR, 'salvage', str(error))
+        return
+    for note in list(dict.fromkeys(found.notes))[:5]:
+        yield Finding(WARNING, 'damage', f'{note}; copy the bag again if there is another copy')
+    images = sum(kind == IMAGE for _, kind, *_ in found.messages)
+    if found.messages:
+        yield Finding(WARNING, 'salvage', f'{len(found.messages)} messages, {images} of them '
+                      'images, can still be read; save them with --salvage NEW_BAG')
+    else:
+        yield Finding(ERROR, 'salvage', 'no message can be read any more; record again')
+
+
+def check_rig(path, model):
+    """Yield whether the cameras of a bag are those that a ModelFolder was trained for."""
+    try:
+        cameras = BagScene(path).cameras
+    except HoocError:
+        return      # said already
+    view_bound = np.array_equal(model.classifier.get('kind'), KIND_PAPER)
+    trouble = rig_trouble(cameras, model.cameras) if view_bound else None
+    yield Finding(WARNING if trouble else OK, 'model',
+                  trouble or f'{model.name} can be used with these {len(cameras)} cameras')
 
 
 def read_streams(path, known):
@@ -136,6 +169,10 @@ def check_stream(topic, stream, known):
         yield Finding(ERROR, topic, f'{topic} sees things {np.median(stream.medians):.0f} m away, '
                       f'so it seems to hold {unit}; publish 16UC1 in millimetres or 32FC1 in '
                       'metres')
+    if stream.medians and np.median(stream.medians) < NEAREST_M:
+        yield Finding(ERROR, topic, f'{topic} sees things {1000 * np.median(stream.medians):.2g} '
+                      f'mm away, so {encodings} seems to hold metres or centimetres; publish '
+                      '16UC1 in millimetres or 32FC1 in metres')
     yield from _check_stamps(topic, stream.stamps)
     if not known.reliable and stream.count > 1:
         yield Finding(WARNING, topic, f'{topic} was recorded from a best-effort publisher, so '

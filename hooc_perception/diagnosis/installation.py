@@ -24,6 +24,7 @@ PACKAGES = {
     'trimesh': ('trimesh', 'meshes'), 'manifold3d': ('manifold3d', 'the repair of meshes'),
     'fcl': ('python-fcl', 'training'), 'mujoco': ('mujoco', 'training of the best profile'),
     'sklearn': ('scikit-learn', 'evaluation'), 'rosbags': ('rosbags', 'bags'),
+    'mcap': ('mcap', 'bags'),
     'open3d': ('open3d', 'baselines of the evaluation'),
     'pyrender': ('pyrender', 'shaded pictures in reports'),
     'matplotlib': ('matplotlib', 'plots'), 'jinja2': ('Jinja2', 'reports'),

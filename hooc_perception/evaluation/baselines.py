@@ -9,6 +9,7 @@ clear; nothing else in the package uses them.
 """
 
 from dataclasses import dataclass
+import itertools
 import time
 
 from hooc_perception.core.config import Config, param
@@ -29,6 +30,9 @@ class BaselineConfig(Config):
 
     voxel_m: float = param(0.005, 'Side of the voxels that thin both clouds.', 'm', 0.001, 0.05)
     feature_radius: float = param(5.0, 'Radius of the features, in voxels.', '', 2.0, 20.0)
+    pair_step: float = param(0.05, 'Steps of the point pair features and distance of the points '
+                             "that they are taken from, as a share of the model's diameter.", '',
+                             0.01, 0.2)
     iterations: int = param(100000, 'RANSAC draws of three correspondences.', '', 100, 10000000)
     inlier_m: float = param(0.01, 'A model point this near to the scene is explained by it.', 'm',
                             0.001, 0.05)
@@ -68,11 +72,14 @@ class Fpfh:
         self.config = config
         o3d.utility.random.seed(seed)
 
-    def prepare(self, cloud):
-        """Return what `poses` needs of one cloud."""
+    def scene(self, cloud):
+        """Return (cloud, features), which `poses` needs of a scene."""
         radius = self.config.feature_radius * self.config.voxel_m
         return cloud, o3d.pipelines.registration.compute_fpfh_feature(
             cloud, o3d.geometry.KDTreeSearchParamHybrid(radius, 100))
+
+    # A model is described as a scene is.
+    model = scene
 
     def poses(self, model, scene):
         """Return candidate T_world_model, best first."""
@@ -98,18 +105,32 @@ class Ppf:
                             'opencv-python-headless')
         self.cv2, self.config = cv2, config
 
-    def prepare(self, cloud):
-        """Return (cloud, (n, 6) float32 points and normals); the vote wants fewer points."""
-        thin = cloud.voxel_down_sample(2 * self.config.voxel_m)
-        thin.normalize_normals()
-        return cloud, np.ascontiguousarray(
-            np.hstack([np.asarray(thin.points), np.asarray(thin.normals)]), np.float32)
+    def model(self, cloud):
+        """Return (cloud, trained detector, spacing of its points in metres)."""
+        spacing = max(2 * self.config.voxel_m, self.config.pair_step * np.linalg.norm(
+            cloud.get_max_bound() - cloud.get_min_bound()))
+        # OpenCV thins once more, by shares of the extents: finely enough to change nothing.
+        detector = self.cv2.ppf_match_3d_PPF3DDetector(self.config.pair_step / 2,
+                                                       self.config.pair_step)
+        detector.trainModel(_oriented(cloud.voxel_down_sample(spacing)))
+        return cloud, detector, spacing
+
+    def scene(self, cloud):
+        """Return (cloud,): how it is thinned is the model's choice."""
+        return (cloud,)
 
     def poses(self, model, scene):
         """Return candidate T_world_model, best first."""
-        detector = self.cv2.ppf_match_3d_PPF3DDetector(0.05, 0.05)
-        detector.trainModel(model[1])
-        return [np.array(found.pose) for found in detector.match(scene[1], 1 / 5, 0.05)[:5]]
+        _, detector, spacing = model
+        points = _oriented(scene[0].voxel_down_sample(spacing))
+        found = detector.match(points, 1 / 5, 0.5 * spacing / np.ptp(points[:, :3], axis=0).max())
+        return [np.array(pose.pose) for pose in found[:5]]
+
+
+def _oriented(cloud):
+    """Return (n, 6) float32 points and unit normals of an Open3D cloud."""
+    cloud.normalize_normals()
+    return np.ascontiguousarray(np.hstack([cloud.points, cloud.normals]), np.float32)
 
 
 METHODS = {'fpfh': Fpfh, 'ppf': Ppf}
@@ -125,14 +146,14 @@ def run_baseline(name, scene_set, models, path, seed=0, config=BaselineConfig())
     """
     method = METHODS[name](config, seed)
     rng = stage_rng(seed, 'baseline')
-    prepared = {category: method.prepare(model_cloud(model, config.voxel_m, rng))
+    prepared = {category: method.model(model_cloud(model, config.voxel_m, rng))
                 for category, model in models.items()}
-    limit = scene_set.max_instances or 1
     entries = []
     for scene in tqdm(scene_set.scenes, desc=name, unit='scene', disable=None):
         views = scene.depth()
         start = time.perf_counter()
-        found = find(method, [rectify(view) for view in views], prepared, limit, config)
+        found = find(method, [rectify(view) for view in views], prepared,
+                     scene_set.max_instances, config)
         entries.append({'scene': scene.name, 'seconds': time.perf_counter() - start,
                         'energy': None, 'objects': [
                             _entry(category, T, fit, models[category])
@@ -144,13 +165,29 @@ def find(method, views, prepared, limit, config):
     """
     Return [(category, T_world_model, share of explained model points)], the best fit first.
 
-    :param prepared: {category: what `method.prepare` made of its model}.
-    :param limit: instances of a category at most.
+    A pass over all categories takes at most one of each; where several may stand there, the next
+    pass looks at the points that are left, until one takes nothing.
+
+    :param prepared: {category: what `method.model` made of its model}.
+    :param limit: instances of a category at most, 0 = any number.
     """
-    cloud = fused_cloud(views, config.voxel_m)
-    if len(cloud.points) < 10:
-        return []
-    scene, tree = method.prepare(cloud), cKDTree(np.asarray(cloud.points))
+    cloud, out = fused_cloud(views, config.voxel_m), []
+    passes = itertools.count() if limit == 0 else range(limit)
+    for _ in passes:
+        if len(cloud.points) < 10:
+            break
+        with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
+            chosen, free = _pass(method, cloud, prepared, config)
+        if not chosen:
+            break
+        out += chosen
+        cloud = cloud.select_by_index(np.flatnonzero(free))
+    return out
+
+
+def _pass(method, cloud, prepared, config):
+    """Return (as `find`, one a category at most; (n,) bool, points that nothing took)."""
+    scene, tree = method.scene(cloud), cKDTree(np.asarray(cloud.points))
     fits = []
     for category, model in prepared.items():
         for T in method.poses(model, scene):
@@ -163,15 +200,13 @@ def find(method, views, prepared, limit, config):
                 taken = np.unique(np.concatenate([
                     [], *tree.query_ball_point(points, config.inlier_m)]).astype(int))
                 fits.append((float(explained.mean()), category, T, taken))
-    free, out = np.ones(len(cloud.points), bool), []
+    free, out = np.ones(len(cloud.points), bool), {}
     # Large explained pieces first: a small model fits anywhere.
     for fit, category, T, taken in sorted(fits, key=lambda f: -f[0] * len(f[3])):
-        if free[taken].mean() < config.min_fresh:
-            continue
-        if sum(c == category for c, _, _ in out) < limit:
-            out.append((category, T, fit))
+        if category not in out and free[taken].mean() >= config.min_fresh:
+            out[category] = (category, T, fit)
             free[taken] = False
-    return out
+    return list(out.values()), free
 
 
 def _entry(category, T_world_model, fit, model):

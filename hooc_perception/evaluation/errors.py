@@ -14,7 +14,7 @@ import functools
 
 from hooc_perception.core.geometry import matrix_from_pose
 from hooc_perception.core.render import render_depth
-from hooc_perception.evaluation.symmetry import is_ball, symmetry_rotations
+from hooc_perception.core.symmetry import is_ball, symmetry_rotations
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import pdist

@@ -204,26 +204,3 @@ def mask_table(evaluation):
     label = f': {evaluation.label}' if evaluation.label else ''
     return Table(f'Explained masks{label}', ('scene', 'explained', 'n', 'IoU', 's'),
                  tuple(rows), notes, (len(rows) - 1,))
-
-
-def stage_table(losses):
-    """Return what each stage loses, one row a scene, from `rerun`."""
-    rows = []
-    for name, loss in losses.items():
-        pixels, pool, answer = loss['pixels'], loss['pool'], loss['answer']
-        rows.append((name, pixels['accuracy'], pixels['balanced_accuracy'],
-                     pixels['true_probability'], pool.candidates, pool.pool_localized,
-                     pool.pool_tight, pool.first_localized, pool.kept, answer.localized,
-                     answer.tight))
-    columns = np.array([row[1:] for row in rows], np.float64)
-    mean = ('mean', *(float(np.nanmean(c)) if np.isfinite(c).any() else None
-                      for c in columns.T))
-    return Table('What the stages lose',
-                 ('scene', 'pixels', 'by class', 'p(true)', 'candidates', 'in pool', '< 2 cm',
-                  'ranked 1st', 'kept', 'local', '< 2 cm'),
-                 (*rows, mean),
-                 ('pixels: share of the pixels on true objects whose most likely class is '
-                  'right, by class: the same averaged over the classes; in pool: share of the '
-                  "true objects with a candidate of their category within half the model's "
-                  'size; ranked 1st: those whose best-scored candidate is; kept: of those in the '
-                  'pool, the share that the answer localizes.',), (len(rows),))

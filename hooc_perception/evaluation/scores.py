@@ -5,8 +5,8 @@
 from dataclasses import dataclass
 
 from hooc_perception.core.geometry import matrix_from_pose
+from hooc_perception.core.symmetry import rotation_error
 from hooc_perception.evaluation.matching import match_by_centre
-from hooc_perception.evaluation.symmetry import rotation_error
 import numpy as np
 
 TIGHT_M = 0.02

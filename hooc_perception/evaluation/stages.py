@@ -70,9 +70,9 @@ def pixel_scores(probabilities, observation, truths, models):
     """
     Return the classifier's scores over all certain foreground pixels of a scene.
 
-    :return: {pixels, accuracy, balanced_accuracy, true_probability, log_loss}: share of pixels
-        whose most likely class is the true one; the same averaged over classes; mean
-        probability of the true class; mean -log of it.
+    :return: {pixels, accuracy, balanced_accuracy, true_probability, log_loss, categories}:
+        share of pixels whose most likely class is the true one; the same averaged over classes;
+        mean probability of the true class; mean -log of it; {category: {pixels, correct}}.
     """
     truth = np.stack([true_classes(truths, models, v) for v in observation.views])
     u, v = probabilities.uv[:, 0].astype(int), probabilities.uv[:, 1].astype(int)
@@ -80,17 +80,20 @@ def pixel_scores(probabilities, observation, truths, models):
     certain = true > 0
     if not certain.any():
         return {'pixels': 0, 'accuracy': float('nan'), 'balanced_accuracy': float('nan'),
-                'true_probability': float('nan'), 'log_loss': float('nan')}
+                'true_probability': float('nan'), 'log_loss': float('nan'), 'categories': {}}
     true, p = true[certain], probabilities.p[certain].astype(np.float64)
     p = (p + 0.5) / (p + 0.5).sum(1, keepdims=True)
     likely = p.argmax(1)
     labels = np.arange(p.shape[1])
     correct = likely == true
-    balanced = np.mean([correct[true == c].mean() for c in np.unique(true)])
+    categories = {models[c - 1].name: {'pixels': int((true == c).sum()),
+                                       'correct': int(correct[true == c].sum())}
+                  for c in np.unique(true)}
+    balanced = np.mean([c['correct'] / c['pixels'] for c in categories.values()])
     return {'pixels': int(certain.sum()), 'accuracy': float(correct.mean()),
             'balanced_accuracy': float(balanced),
             'true_probability': float(p[np.arange(len(true)), true].mean()),
-            'log_loss': float(log_loss(true, p, labels=labels))}
+            'log_loss': float(log_loss(true, p, labels=labels)), 'categories': categories}
 
 
 @dataclass(frozen=True)
@@ -103,6 +106,7 @@ class StageLoss:
     :ivar first_localized: the best-scored candidate of the category lies within half the size.
     :ivar kept: of the objects with a localized candidate, those localized in the answer.
     :ivar candidates: number of candidates.
+    :ivar objects: a dict (category, near, tight, first) of the same for every true object.
     """
 
     pool_localized: float
@@ -110,6 +114,7 @@ class StageLoss:
     first_localized: float
     kept: float
     candidates: int
+    objects: tuple = ()
 
 
 def pool_recall(pool, truths, models, score=None):
@@ -136,4 +141,28 @@ def pool_recall(pool, truths, models, score=None):
         localized[[o.truth for o in score.objects if o.localized]] = True
         kept = float(localized[near].mean())
     n = max(len(truths), 1)
-    return StageLoss(near.sum() / n, tight.sum() / n, first.sum() / n, kept, len(pool))
+    objects = tuple({'category': t.category, 'near': bool(a), 'tight': bool(b), 'first': bool(c)}
+                    for t, a, b, c in zip(truths, near, tight, first))
+    return StageLoss(near.sum() / n, tight.sum() / n, first.sum() / n, kept, len(pool), objects)
+
+
+def losses_by_category(losses, categories):
+    """
+    Return {category: dict} of what the stages lose of each, from `rerun`'s losses.
+
+    The dict counts true objects, certain pixels and those rightly classified, objects with a
+    candidate near, within 2 cm, or ranked first, and objects localized in the answer.
+    """
+    out = {c: dict.fromkeys(('true', 'pixels', 'correct', 'near', 'tight', 'first', 'localized'),
+                            0) for c in categories}
+    for loss in losses.values():
+        for category, count in loss['pixels']['categories'].items():
+            for key, n in count.items():
+                out[category][key] += n
+        for thing in loss['pool'].objects:
+            out[thing['category']]['true'] += 1
+            for key in ('near', 'tight', 'first'):
+                out[thing['category']][key] += thing[key]
+        for thing in loss['answer'].objects:
+            out[thing.category]['localized'] += thing.localized
+    return out

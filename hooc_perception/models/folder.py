@@ -15,6 +15,7 @@ unpickles nothing and follows no path out of the folder.
 from dataclasses import dataclass, field
 import hashlib
 import json
+import math
 import os
 from pathlib import Path
 import re
@@ -30,6 +31,9 @@ import trimesh
 FORMAT = 'hooc-model/1'
 MAX_JSON_BYTES = 4 * 10**6
 MAX_FILE_BYTES = 2 * 10**9
+MAX_SIDE = 8192
+# What we write is not compressed; 20 times is more than numbers of meshes ever yield.
+MAX_RATIO = 20
 SAFE_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}')
 # GenericModel fields of the same shape for every model are stacked, the others joined.
 STACKED = ('extents', 'surface_points', 'surface_normals', 'interior_points', 'volume',
@@ -166,7 +170,7 @@ def _read_meta(path):
     try:
         meta = json.loads(file.read_text(encoding='utf-8'))
     except (ValueError, RecursionError) as e:
-        raise HoocError(f'{file} is not valid JSON ({e}); train again') from e
+        raise HoocError(f'{file} is not valid JSON ({_reason(e)}); train again') from e
     found = meta.get('format') if isinstance(meta, dict) else None
     if found != FORMAT:
         raise HoocError(f'{file} has the format {found!r}, but this version reads {FORMAT}; '
@@ -204,8 +208,9 @@ def _read_array(file):
     """Return one .npy array, mapped copy-on-write: writing to it leaves the file alone."""
     try:
         array = np.load(file, mmap_mode='c', allow_pickle=False)
-    except (ValueError, OSError, EOFError, SyntaxError) as e:
-        raise HoocError(f'{file} is not an array of plain numbers ({e}); train again') from e
+    except Exception as e:      # numpy fails on a stranger's bytes in many ways
+        raise HoocError(f'{file} is not an array of plain numbers ({_reason(e)}); '
+                        'train again') from e
     if array.dtype.kind not in 'biufU':
         raise HoocError(f'{file} holds {array.dtype}, not plain numbers; train again')
     # numba compiles a np.memmap separately from an array; a view is just an array.
@@ -216,8 +221,11 @@ def _read_models(file, names):
     """Return the tuple of GenericModel in models.npz, its shapes and indices checked."""
     try:
         with zipfile.ZipFile(file) as archive:
-            if sum(info.file_size for info in archive.infolist()) > MAX_FILE_BYTES:
+            size = sum(info.file_size for info in archive.infolist())
+            if size > min(MAX_FILE_BYTES, MAX_RATIO * file.stat().st_size):
                 raise ValueError('its contents are too large')
+            for info in archive.infolist():
+                _check_header(archive, info)
         with np.load(file, allow_pickle=False) as archive:
             data = {key: archive[key] for key in archive.files}
         n = len(names)
@@ -236,9 +244,28 @@ def _read_models(file, names):
             for i, name in enumerate(names))
         for model in models:
             _check_model(model)
-    except (KeyError, ValueError, OSError, EOFError, zipfile.BadZipFile, MemoryError) as e:
-        raise HoocError(f'{file} is not what hooc train writes ({e}); train again') from e
+    except Exception as e:      # zipfile and numpy fail on a stranger's bytes in many ways
+        raise HoocError(f'{file} is not what hooc train writes ({_reason(e)}); '
+                        'train again') from e
     return models
+
+
+def _reason(error):
+    """Return the short text of an exception, in one line."""
+    return ' '.join(str(error).split())[:160] or type(error).__name__
+
+
+def _check_header(archive, info):
+    """Raise ValueError where an array says that it is larger than it is: numpy trusts it."""
+    with archive.open(info) as stream:
+        version = np.lib.format.read_magic(stream)
+        read = {(1, 0): np.lib.format.read_array_header_1_0,
+                (2, 0): np.lib.format.read_array_header_2_0}.get(version)
+        if read is None:
+            raise ValueError(f'{info.filename} has a header of version {version}')
+        shape, _, dtype = read(stream)
+        if dtype.hasobject or math.prod(shape) * dtype.itemsize > info.file_size:
+            raise ValueError(f'{info.filename} is no array of the size that it says')
 
 
 def _check_model(model):
@@ -280,5 +307,7 @@ def _camera_from_dict(data):
     T = np.array(data['T_world_camera'], np.float64).reshape(4, 4)
     if not (np.isfinite(K).all() and np.isfinite(D).all() and np.isfinite(T).all()):
         raise ValueError('cameras')
-    return Camera(str(data['name']), int(data['width']), int(data['height']), K, D, T,
-                  str(data['distortion_model']))
+    width, height = int(data['width']), int(data['height'])
+    if not (0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE and K[0, 0] > 0 and K[1, 1] > 0):
+        raise ValueError('cameras')
+    return Camera(str(data['name']), width, height, K, D, T, str(data['distortion_model']))

@@ -3,8 +3,10 @@
 """Read a user's mesh file with distrust and hand back a clean, centred mesh in metres."""
 
 import io
+import json
 import math
 from pathlib import Path
+import struct
 
 from hooc_perception.errors import HoocError
 from hooc_perception.models.repair import closed
@@ -15,6 +17,7 @@ __all__ = ['closed', 'load_mesh']
 
 MAX_BYTES = 200 * 10**6
 MAX_FACES = 2 * 10**6
+MAX_NODES = 10**4
 # A generic model is a thing on a table; anything longer was not given in metres.
 MAX_SIDE_M = 10.0
 MIN_SIDE_M = 1e-6
@@ -82,14 +85,44 @@ def _read(path):
     if kind in ARCHIVES or kind not in trimesh.available_formats():
         raise HoocError(f'mesh {path} has the unknown format {kind!r}; convert it to PLY, OBJ, '
                         'STL or OFF')
+    data = path.read_bytes()
     try:
+        if kind in ('glb', 'gltf'):
+            _check_gltf(data)
         # Parsers meet arbitrary bytes here, so whatever they raise means "not a mesh".
-        mesh = trimesh.load(io.BytesIO(path.read_bytes()), file_type=kind, force='mesh',
-                            process=False, skip_materials=True)
+        scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False,
+                                   skip_materials=True)
+        _check_instances(scene)
+        mesh = scene.to_mesh()
         if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
             raise ValueError('it holds no faces')
-    except Exception as e:
+    except (Exception, MemoryError) as e:
         reason = ' '.join(str(e).split())[:120] or type(e).__name__
         raise HoocError(f'mesh {path} cannot be read as {kind.upper()} ({reason}); '
                         'export it again') from e
     return mesh
+
+
+def _check_gltf(data):
+    """Raise ValueError where a glTF file of little size stands for much: nodes, empty arrays."""
+    if data[:4] == b'glTF':
+        length, = struct.unpack_from('<I', data, 12)
+        data = data[20:20 + length]
+    content = json.loads(data)
+    nodes, accessors = content.get('nodes', ()), content.get('accessors', ())
+    if len(nodes) > MAX_NODES:
+        raise ValueError(f'it has {len(nodes)} nodes, more than {MAX_NODES}')
+    numbers = sum(int(accessor['count']) for accessor in accessors)
+    if numbers > 8 * MAX_FACES:
+        raise ValueError(f'its arrays have {numbers} rows')
+    if any(str(part.get('uri', 'data:'))[:5] != 'data:' for part in content.get('buffers', ())):
+        raise ValueError('it refers to other files; export it as one')
+
+
+def _check_instances(scene):
+    """Raise ValueError where the same faces are placed so often that they are too many."""
+    names = scene.graph.nodes_geometry
+    faces = sum(len(getattr(scene.geometry[scene.graph[name][1]], 'faces', ()))
+                for name in names)
+    if faces > MAX_FACES:
+        raise ValueError(f'its parts have {faces} faces, more than {MAX_FACES}; simplify it')

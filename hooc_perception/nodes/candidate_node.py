@@ -55,8 +55,9 @@ class CandidateNode(StageNode):
     def on_set(self, stamp_ns, observation, messages):
         """Propose candidates for one frame set."""
         start = time.monotonic()
-        probabilities = probabilities_from_message(messages['probabilities'])
         try:
+            probabilities = probabilities_from_message(messages['probabilities'], observation,
+                                                       len(self.models))
             candidates = propose(observation, probabilities, self.models,
                                  self.parameters['propose'],
                                  stage_rng(self.config.seed, 'propose'))

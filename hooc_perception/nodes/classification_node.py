@@ -5,8 +5,9 @@
 import sys
 import time
 
-from hooc_perception.core.classify import classify
+from hooc_perception.core.classify import classify, KIND_PAPER
 from hooc_perception.core.observe import observe
+from hooc_perception.core.plausible import rig_trouble
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
@@ -15,6 +16,7 @@ from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_messages import label_images, probabilities_message
 from hooc_perception.ros.stage_node import StageConfig, StageNode
 from hooc_perception.ros.view_topics import ViewInput
+import numpy as np
 from sensor_msgs.msg import Image, PointCloud2
 
 
@@ -30,6 +32,11 @@ class ClassificationNode(StageNode):
         model = model_of(self.config)
         self.names = camera_names(self.config, model)
         self.classes, self.classifier = [m.name for m in model.models], model.classifier
+        # The paper's forests look into all views at once, from where they were trained.
+        self.trained = model.cameras if np.array_equal(
+            self.classifier.get('kind'), KIND_PAPER) else ()
+        if self.trained and len(self.names) != len(self.trained):
+            raise HoocError(rig_trouble(self.names, self.trained))
         warmed(self, model, lambda views, *_: classify(
             observe(views, self.parameters['observe']), self.classifier,
             self.parameters['classify']))
@@ -42,6 +49,10 @@ class ClassificationNode(StageNode):
         """Classify one frame set."""
         start = time.monotonic()
         head = header(stamp_ns, self.config.target_frame)
+        trouble = self.trained and rig_trouble([v.camera for v in observation.views],
+                                               self.trained)
+        if trouble:
+            self.diagnostics.warn('model', 'other_rig', trouble)
         try:
             probabilities = classify(observation, self.classifier, self.parameters['classify'])
             self.probabilities.publish(

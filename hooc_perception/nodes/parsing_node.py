@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stage 4: candidates -> the objects that together explain the frame set."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 import json
 import sys
 import time
@@ -12,11 +12,15 @@ from hooc_perception.core.config import param
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe
 from hooc_perception.core.parse import parse
+from hooc_perception.core.tracking import TrackConfig, Tracker
 from hooc_perception.core.unexplained import unexplained_points
+from hooc_perception.core.verify import Verifier
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
+from hooc_perception.ros.adapters.choose import AdapterConfig, adapters_of
 from hooc_perception.ros.detect_service import DetectService
+from hooc_perception.ros.found import found_scene
 from hooc_perception.ros.object_output import ObjectOutput
 from hooc_perception.ros.reproposal import MoreCandidates
 from hooc_perception.ros.spin import run_node
@@ -28,7 +32,7 @@ from std_srvs.srv import SetBool, Trigger
 
 
 @dataclass(frozen=True)
-class ParsingConfig(StageConfig):
+class ParsingConfig(AdapterConfig, TrackConfig, StageConfig):
     """Parameters of the parsing node."""
 
     max_instances: int = param(-1, 'Objects of one category in a scene at most; 0 sets no '
@@ -51,9 +55,11 @@ class ParsingNode(StageNode):
         """Load the generic models, build the endpoints."""
         model = model_of(self.config)
         self.models, self.enabled = model.models, True
+        self.verifier = Verifier.from_arrays(model.classifier)
         limit = self.config.max_instances
         self.max_instances = model.max_instances if limit < 0 else limit
         warmed(self, model, self.try_out)
+        self.tracker = Tracker(model.models, self.config)
         self.output = ObjectOutput(self, model.models, [
             (model.mesh_path(m.name).resolve().as_uri(), model.mesh_sha256[m.name])
             for m in model.models])
@@ -62,7 +68,9 @@ class ParsingNode(StageNode):
             'poses': (PoseArray, 'candidates/poses'),
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set)
         self.more = MoreCandidates(self)
-        self.detect = DetectService(self)
+        self.detect = DetectService(self, lambda: None if self.enabled else (
+            'frame sets are ignored: call enable with true'))
+        self.adapters = adapters_of(self)
         self.owned(self.destroy_service, self.create_service(SetBool, 'enable', self.on_enable))
         self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
 
@@ -70,12 +78,19 @@ class ParsingNode(StageNode):
         """Parse a made-up scene."""
         observation = observe(views, self.parameters['observe'])
         parsed = parse(observation, probabilities, candidates, models, self.parameters['parse'],
-                       stage_rng(self.config.seed, 'parse'), self.max_instances)
+                       stage_rng(self.config.seed, 'parse'), self.max_instances,
+                       verifier=self.verifier)
         unexplained_points(observation, parsed.objects, models)
 
     def activate(self):
         """Say what the class ids mean."""
         self.output.announce()
+
+    def deactivate(self):
+        """Take back what other packages keep, and let nobody wait."""
+        self.detect.fail('the node was deactivated')
+        for adapter in self.adapters:
+            adapter.clear(self.now_ns(), self.config.target_frame)
 
     def on_set(self, stamp_ns, observation, messages):
         """Parse one frame set."""
@@ -83,32 +98,45 @@ class ParsingNode(StageNode):
             return
         start = time.monotonic()
         try:
+            n = len(self.models)
             parsed = parse(
-                observation, probabilities_from_message(messages['probabilities']),
-                candidates_from_messages(messages['poses'], messages['attributes']),
+                observation, probabilities_from_message(messages['probabilities'], observation, n),
+                candidates_from_messages(messages['poses'], messages['attributes'], n),
                 self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
-                self.max_instances, self.more.asker(stamp_ns, self.config.more_timeout_s))
+                self.max_instances, self.more.asker(stamp_ns, self.config.more_timeout_s),
+                self.verifier)
         except HoocError as error:
             self.diagnostics.error('parse', 'refused', str(error))
             return
-        left = unexplained_points(observation, parsed.objects, self.models)
+        self.tracker.config = self.config
+        ids, objects = self.tracker.update(stamp_ns, parsed.objects)
+        parsed = replace(parsed, objects=objects)
+        left = unexplained_points(observation, objects, self.models)
+        scene = found_scene(parsed, ids, self.models, stamp_ns, self.config.target_frame)
+        for adapter in self.adapters:
+            adapter.publish(scene)
         age_s = (self.now_ns() - stamp_ns) * 1e-9
-        ids = self.output.publish(parsed, stamp_ns, self.config.target_frame, age_s, left)
-        self.detect.answer(stamp_ns, parsed, ids, self.models)
+        self.output.publish(parsed, ids, stamp_ns, self.config.target_frame, age_s, left)
+        self.detect.answer(scene)
         self.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
                             energy=float(parsed.energy.total), age_s=age_s)
 
     def on_enable(self, request, response):
         """Let frame sets be parsed, or ignore them."""
         self.enabled = request.data
+        if not self.enabled:
+            self.detect.fail('frame sets are ignored from now on')
         response.success = True
         response.message = 'parsing' if self.enabled else 'frame sets are ignored'
         return response
 
     def on_reset(self, request, response):
-        """Forget what waits to be joined and take what viewers show away."""
+        """Forget what waits to be joined and what was seen; take the last answer back."""
         self.input.clear()
-        self.output.clear()
+        self.tracker.forget()
+        if self.active:
+            for each in (*self.adapters, self.output):
+                each.clear(self.now_ns(), self.config.target_frame)
         response.success, response.message = True, json.dumps({'objects': 0})
         return response
 

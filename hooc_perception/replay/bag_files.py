@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
+from hooc_perception.replay import mcap_file
 from hooc_perception.scenes import files
 from rosbags.interfaces import QosDurability, QosReliability
 from rosbags.rosbag2 import Reader
@@ -83,7 +84,10 @@ def _reading(path):
                         'recording was cut off; run "ros2 bag reindex" or record again')
     if path.is_dir():
         # Size and depth are bounded here; rosbags would take anything.
-        files.read_yaml(path / 'metadata.yaml')
+        _check_compression(path, files.read_yaml(path / 'metadata.yaml'))
+    for file in path.glob('*.mcap') if path.is_dir() else [path]:
+        if file.suffix == '.mcap' and file.is_file():
+            mcap_file.check(file)
     try:
         with Reader(path) as reader:
             yield reader
@@ -92,7 +96,16 @@ def _reading(path):
     except Exception as error:
         reason = ' '.join(str(error).split())[:160] or type(error).__name__
         raise HoocError(f'{path}: the bag is truncated, damaged or no bag ({reason}); '
-                        'record or copy it again') from None
+                        'copy it again, or save what is left with hooc doctor --salvage') from None
+
+
+def _check_compression(path, metadata):
+    """Refuse whole files and single messages that are compressed: their size has no bound."""
+    info = metadata.get('rosbag2_bagfile_information')
+    mode = str(info.get('compression_mode') or '').lower() if isinstance(info, dict) else ''
+    if mode not in ('', 'none', 'storage'):
+        raise HoocError(f'{path}: the bag is compressed by {mode}; rewrite it with "ros2 bag '
+                        'convert" (MCAP with its own compression is read)')
 
 
 def _topic(connection):

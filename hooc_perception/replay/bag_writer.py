@@ -10,6 +10,7 @@ import tempfile
 from hooc_perception.core.depth_encodings import encode_depth, METRES, MILLIMETRES
 from hooc_perception.core.geometry import pose_from_matrix
 from hooc_perception.errors import HoocError
+from hooc_perception.replay import mcap_file
 from hooc_perception.scenes.writer import true_object_entry
 import numpy as np
 from rosbags.interfaces import (
@@ -112,6 +113,8 @@ def _write(path, storage, latched, images, repeat, rate):
             for topic, kind, message in images:
                 message.header.stamp = _time(stamp_ns)
                 write(topic, kind, message, stamp_ns, _qos(latched=False))
+    if storage == 'mcap':
+        mcap_file.seal(path / f'{path.name}.mcap')
 
 
 def _latched(scene, scene_set):

@@ -5,6 +5,7 @@
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
+from hooc_perception.replay import mcap_file
 from hooc_perception.replay.bag_writer import STORAGES
 from rosbags.interfaces import (
     Qos,
@@ -30,6 +31,7 @@ class RawBagWriter:
         if path.exists():
             raise HoocError(f'{path}: exists already; remove it or choose another folder')
         path.parent.mkdir(parents=True, exist_ok=True)
+        self._path = path / f'{path.name}.mcap'
         self._writer = Writer(path, version=9, storage_plugin=STORAGES[storage])
         self._writer.open()
         self._connections = {}
@@ -41,6 +43,8 @@ class RawBagWriter:
     def __exit__(self, *_):
         """Finish the bag."""
         self._writer.close()
+        if self._path.is_file():
+            mcap_file.seal(self._path)
 
     def write(self, topic, type_name, data, time_ns, latched=False):
         """

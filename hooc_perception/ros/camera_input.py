@@ -3,11 +3,13 @@
 """One raw depth camera: pairs images with calibration, knows where the camera stands."""
 
 from collections import OrderedDict
+import time
 
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.conversions import header, nanoseconds, transform_message
 from hooc_perception.ros.qos import auto_reliability, overridable, qos
+from hooc_perception.ros.silence import why_silent
 from rcl_interfaces.msg import ParameterDescriptor
 from sensor_msgs.msg import CameraInfo, Image
 
@@ -67,6 +69,9 @@ class CameraInput:
         self.name, self.node, self._tf, self._callback = name, node, tf, callback
         self._pose, self._latched = pose, None
         self._infos, self._images, self._last_info = OrderedDict(), OrderedDict(), None
+        # The stamp of the last image whose own camera_info did not come, 0 = all did.
+        self._unmatched = 0
+        self.heard = time.monotonic()   # when the last image came
         node.subscription(TransformStamped, '<camera>/extrinsics', self._on_extrinsics,
                           f'{name}/extrinsics')
         self._reliable = None
@@ -92,7 +97,7 @@ class CameraInput:
         for kind, suffix, callback in ((CameraInfo, 'camera_info', self._on_info),
                                        (Image, 'image_raw', self._on_image)):
             self._subscriptions.append(self.node.create_subscription(
-                kind, f'{self.name}/depth/{suffix}', callback,
+                kind, f'{self.name}/depth/{suffix}', self.node.guarded(callback),
                 qos(f'<camera>/depth/{suffix}', wanted),
                 qos_overriding_options=overridable(reliability=False)))
 
@@ -108,29 +113,52 @@ class CameraInput:
     def _on_info(self, message):
         self._last_info = message
         self._hold(self._infos, message)
-        self._match(nanoseconds(message.header.stamp))
+        stamp = nanoseconds(message.header.stamp)
+        if stamp == self._unmatched:
+            self._unmatched = 0     # it was only late
+        self._match(stamp)
 
     def _on_image(self, message):
+        self.heard = time.monotonic()
         if not self.node.active:
             return
         stamp = nanoseconds(message.header.stamp)
-        if self._images and stamp not in self._infos and self._last_info is not None:
+        self._hold(self._images, message)
+        if self._match(stamp):
+            return
+        if self._last_info is None:
+            if len(self._images) > 1:
+                self.node.diagnostics.warn(self.name, *self.info_silence())
+        elif self._unmatched or len(self._images) > 1:
             # A driver that does not stamp both alike: after one image without its own
             # camera_info, the latest one has to do.
             self.node.diagnostics.count(self.name, 'camera_info_stamp_differs')
             self._images.clear()
+            self._unmatched = stamp
             self._deliver(message, self._last_info)
-            return
-        if self._images and self._last_info is None:
-            self.node.diagnostics.warn(
-                self.name, 'no_camera_info', f'depth images arrive but no camera_info on '
-                f'{self.name}/depth/camera_info; the image is dropped')
-        self._hold(self._images, message)
-        self._match(stamp)
 
     def _match(self, stamp):
-        if stamp in self._images and stamp in self._infos:
-            self._deliver(self._images.pop(stamp), self._infos.pop(stamp))
+        """Deliver the pair of a stamp if both are there; return whether they were."""
+        if stamp not in self._images or stamp not in self._infos:
+            return False
+        image, info = self._images.pop(stamp), self._infos.pop(stamp)
+        self._unmatched = 0
+        self._images.clear()
+        self._deliver(image, info)
+        return True
+
+    def silence(self):
+        """Return (code, sentence) on why nothing comes of this camera, as far as one can see."""
+        topics = {s.topic_name.rpartition('/')[2]: s for s in self._subscriptions}
+        return why_silent(self.node, topics['image_raw'])
+
+    def info_silence(self):
+        """Return (code, sentence) on why no camera_info comes, None where one has come."""
+        if self._last_info is not None:
+            return None
+        topics = {s.topic_name.rpartition('/')[2]: s for s in self._subscriptions}
+        code, sentence = why_silent(self.node, topics['camera_info'])
+        return 'no_camera_info', f'depth images arrive but no camera_info: {sentence}'
 
     @staticmethod
     def _hold(waiting, message, capacity=4):

@@ -145,15 +145,19 @@ def camera_from_messages(name, info, transform):
                   canonical_pose(matrix_from_pose(translation, rotation)), model)
 
 
+def pose_message(translation, rotation_xyzw):
+    """Return the Pose of (3,) and (4,) float64, kept to the last bit."""
+    pose = Pose()
+    p, q = pose.position, pose.orientation
+    p.x, p.y, p.z = np.asarray(translation).tolist()
+    q.x, q.y, q.z, q.w = np.asarray(rotation_xyzw).tolist()
+    return pose
+
+
 def pose_array_message(translation, rotation_xyzw, head):
     """Return the PoseArray of (n, 3) and (n, 4) float64, kept to the last bit."""
-    poses = []
-    for t, q in zip(np.asarray(translation).tolist(), np.asarray(rotation_xyzw).tolist()):
-        pose = Pose()
-        pose.position.x, pose.position.y, pose.position.z = t
-        pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = q
-        poses.append(pose)
-    return PoseArray(header=head, poses=poses)
+    return PoseArray(header=head, poses=[
+        pose_message(t, q) for t, q in zip(translation, rotation_xyzw)])
 
 
 def poses_from_message(message):

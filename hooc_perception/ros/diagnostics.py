@@ -8,7 +8,9 @@ import time
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
-THROTTLE_S = 5.0
+# Trouble that goes on is logged again after this time, then ever more seldom: a camera that is
+# gone for the night should not fill the disk.
+THROTTLE_S, MOST_SELDOM_S = 5.0, 300.0
 # How long a report stays current: a trouble that does not come back is over.
 HOLD_S = 5.0
 
@@ -17,8 +19,8 @@ class Diagnostics:
     """
     Collect reports about named things (a camera, the stage, the model) and publish them.
 
-    Also the one way to log trouble: each (thing, code) is logged at most every five seconds,
-    however often it is counted.
+    Also the one way to log trouble: each (thing, code) is logged at most every five seconds, then
+    every ten and so on up to five minutes, however often it is counted; and once when it is over.
     """
 
     def __init__(self, node):
@@ -29,7 +31,7 @@ class Diagnostics:
         self._state = {}            # thing -> (level, code, sentence, monotonic seconds)
         self._values = {}           # thing -> {key: value}
         self._counts = Counter()    # (thing, code) -> number
-        self._logged = {}           # (thing, code) -> monotonic seconds
+        self._logged = {}           # (thing, code) -> (monotonic seconds, pause until the next)
 
     def ok(self, thing, **values):
         """Report that `thing` works; `values` are shown with it."""
@@ -37,6 +39,9 @@ class Diagnostics:
         # A warning stays visible for a while, or nobody would ever see it at 1 Hz.
         if level == OK or time.monotonic() - when > HOLD_S:
             self._state[thing] = (OK, 'ok', 'ok', time.monotonic())
+            if level != OK:
+                self._node.get_logger().info(f'{thing}: works again')
+                self._logged = {key: v for key, v in self._logged.items() if key[0] != thing}
         self._values.setdefault(thing, {}).update(values)
 
     def succeeded(self):
@@ -65,8 +70,9 @@ class Diagnostics:
         now = time.monotonic()
         self._counts[thing, code] += 1
         self._state[thing] = (level, code, sentence, now)
-        if now - self._logged.get((thing, code), -THROTTLE_S) >= THROTTLE_S:
-            self._logged[thing, code] = now
+        logged, pause = self._logged.get((thing, code), (-MOST_SELDOM_S, 0.0))
+        if now - logged >= pause:
+            self._logged[thing, code] = now, min(max(THROTTLE_S, 2 * pause), MOST_SELDOM_S)
             logger = self._node.get_logger()
             text = sentence if thing == 'node' else f'{thing}: {sentence}'
             # Two calls: rclpy wants one severity a line of code.

@@ -4,20 +4,21 @@
 
 import colorsys
 import json
-import re
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.ros.conversions import header, pose_array_message
-from hooc_perception.ros.stage_messages import labels_json, objects_messages, points_message
+from hooc_perception.ros.found import topic_token
+from hooc_perception.ros.point_clouds import cloud_message, row_dtype
+from hooc_perception.ros.stage_messages import (
+    labels_json,
+    OBJECT_COLUMNS,
+    objects_messages,
+    points_message,
+)
+import numpy as np
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
-
-
-def topic_token(name):
-    """Return a name as a token that a topic may hold: letters, digits, underscores."""
-    token = re.sub(r'[^A-Za-z0-9_]', '_', name)
-    return f'_{token}' if token[:1].isdigit() else token
 
 
 class ObjectOutput:
@@ -31,7 +32,7 @@ class ObjectOutput:
     def __init__(self, node, models, meshes):
         """Create the publishers on a StageNode."""
         self.models, self.meshes = models, meshes
-        self._next_id, self._shown = 1, []
+        self._shown = set()
         self._poses = node.publisher(PoseArray, 'objects/poses')
         self._attributes = node.publisher(PointCloud2, 'objects/attributes')
         self._labels = node.publisher(String, 'objects/labels')
@@ -46,17 +47,15 @@ class ObjectOutput:
         """Latch what the class ids mean, before there is any answer."""
         self._labels.publish(String(data=labels_json(self.models, self.meshes)))
 
-    def publish(self, parsed, stamp_ns, frame, age_s, unexplained):
+    def publish(self, parsed, ids, stamp_ns, frame, age_s, unexplained):
         """
         Publish one answer; `objects/poses` goes last, so that whoever waits for it has all.
 
+        :param ids: (n,) uint32 instance ids.
         :param age_s: seconds since the stamp.
         :param unexplained: (n, 3) world points.
-        :return: the instance ids: numbers that no earlier object had, since nothing is tracked.
         """
         head, found = header(stamp_ns, frame), parsed.objects
-        ids = list(range(self._next_id, self._next_id + len(found)))
-        self._next_id += len(found)
         poses, attributes = objects_messages(parsed, ids, age_s, head)
         self._labels.publish(String(data=labels_json(self.models, self.meshes, ids,
                                                      found.category)))
@@ -68,22 +67,29 @@ class ObjectOutput:
         self._unexplained.publish(points_message(unexplained, head))
         self._summary.publish(String(data=summary_json(parsed, stamp_ns)))
         self._poses.publish(poses)
-        return ids
 
-    def clear(self):
-        """Take away what viewers show."""
+    def clear(self, stamp_ns, frame):
+        """Take the last answer back: empty messages on every topic, no markers."""
+        head, none = header(stamp_ns, frame), np.zeros((0, 3))
+        self._labels.publish(String(data=labels_json(self.models, self.meshes)))
+        self._attributes.publish(cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head))
+        for publisher in self._by_category:
+            publisher.publish(PoseArray(header=head))
         self._markers.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
-        self._shown = []
+        self._shown = set()
+        self._unexplained.publish(points_message(none, head))
+        self._poses.publish(PoseArray(header=head))
 
     def _markers_message(self, poses, found, ids, head):
         """Return DELETE for what was shown and is gone, ADD for what stands there now."""
+        now = {(self.models[c - 1].name, int(number)) for c, number in zip(found.category, ids)}
         markers = [Marker(header=head, ns=ns, id=number, action=Marker.DELETE)
-                   for ns, number in self._shown]
-        self._shown = []
+                   for ns, number in sorted(self._shown - now)]
+        self._shown = now
         for i, number in enumerate(ids):
             class_id = int(found.category[i])
             model = self.models[class_id - 1]
-            marker = Marker(header=head, ns=model.name, id=number, action=Marker.ADD,
+            marker = Marker(header=head, ns=model.name, id=int(number), action=Marker.ADD,
                             type=Marker.MESH_RESOURCE, pose=poses.poses[i],
                             mesh_resource=self.meshes[class_id - 1][0])
             scale = found.size[i] / model.extents
@@ -91,7 +97,6 @@ class ObjectOutput:
             hue = class_id * 0.618034 % 1.0     # golden ratio: neighbours differ
             marker.color.r, marker.color.g, marker.color.b = colorsys.hsv_to_rgb(hue, 0.6, 0.95)
             marker.color.a = 0.8
-            self._shown.append((model.name, number))
             markers.append(marker)
         return MarkerArray(markers=markers)
 

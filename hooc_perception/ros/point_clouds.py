@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """PointCloud2 as what it is: a table of rows with named, typed columns."""
 
+import textwrap
+
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.conversions import message_bytes
 import numpy as np
@@ -55,14 +57,24 @@ def cloud_rows(message, required=()):
     names = [f.name for f in message.fields]
     missing = [name for name in required if name not in names]
     if missing:
-        raise HoocError(f'a point cloud has no field {", ".join(missing)} (it has '
-                        f'{", ".join(names)}); is another node publishing on its topic?')
+        there = textwrap.shorten(', '.join(map(repr, names)), 200, placeholder=' ...')
+        raise HoocError(f'a point cloud has no field {", ".join(missing)} (it has {there}); is '
+                        'another node publishing on its topic?')
     n = message.width * message.height
     if len(message.data) < n * message.point_step:
         raise HoocError(f'a point cloud of {n} points with step {message.point_step} holds only '
                         f'{len(message.data)} bytes')
-    dtype = np.dtype({'names': names, 'formats': [order + _TYPES[f.datatype]
-                                                  for f in message.fields],
-                      'offsets': [f.offset for f in message.fields],
-                      'itemsize': message.point_step})
-    return np.frombuffer(message.data, dtype, n)
+    try:
+        kinds = [np.dtype(order + _TYPES[f.datatype]) for f in message.fields]
+        # numpy adds them up in a C int, and would read far outside of the data.
+        if any(f.offset + kind.itemsize > message.point_step
+               for f, kind in zip(message.fields, kinds)):
+            raise ValueError
+        dtype = np.dtype({'names': names, 'formats': kinds,
+                          'offsets': [f.offset for f in message.fields],
+                          'itemsize': message.point_step})
+        return np.frombuffer(message.data, dtype, n)
+    except (KeyError, ValueError, OverflowError, TypeError):
+        raise HoocError(f'the fields of a point cloud do not fit into its step of '
+                        f'{message.point_step} bytes, have the same name twice or no type that '
+                        'there is; is another node publishing on its topic?') from None

@@ -28,6 +28,7 @@ TOPICS = {
     'views/<camera>/depth_rect': (4, False),
     'views/<camera>/camera_info': (4, True),
     'views/<camera>/extrinsics': (4, True),
+    'views/<camera>/count': (1, False),
     'views/points': (1, False),
     'pixels/probabilities': (4, False),
     'pixels/<camera>/labels': (1, False),
@@ -43,6 +44,9 @@ TOPICS = {
     'objects/markers': (1, True),
     'scene/unexplained': (1, True),
     'scene/summary': (1, True),
+    'objects/detections': (1, True),
+    '/tf': (100, False),
+    '/planning_scene': (10, False),
     'replay/status': (1, True),
 }
 

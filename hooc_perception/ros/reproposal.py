@@ -71,6 +71,8 @@ class MoreCandidates:
             self._requests.publish(String(data=request_text(stamp_ns, turn, objects)))
             parts, deadline = {}, time.monotonic() + timeout_s
             while time.monotonic() < deadline and self._node.context.ok():
+                if not self._node.count_publishers('candidates/more/poses'):
+                    break       # the candidate node has died: nobody else will answer
                 for part, subscription in self._inputs.items():
                     with subscription.handle:
                         taken = subscription.handle.take_message(subscription.msg_type, False)
@@ -81,7 +83,7 @@ class MoreCandidates:
                 time.sleep(_POLL_S)
             self._node.diagnostics.warn(
                 'parse', 'no_more_candidates', f'the candidate node did not answer round {turn} '
-                f'of re-proposal within {timeout_s:g} s; going on without')
+                f'of re-proposal within {timeout_s:g} s or is gone; going on without')
             return Candidates.empty()
         return more
 

@@ -49,16 +49,29 @@ def probabilities_message(probabilities, observation, names, head):
     return cloud_message(rows, head)
 
 
-def probabilities_from_message(message):
-    """Return the PixelProbabilities of their PointCloud2; class columns in message order."""
+def probabilities_from_message(message, observation=None, n_models=None):
+    """
+    Return the PixelProbabilities of their PointCloud2; class columns in message order.
+
+    :param observation, n_models: what they must fit; compiled code trusts their indices.
+    :raises HoocError: where a column is missing, or they are those of other cameras or models.
+    """
     known = [name for name, _ in PIXEL_COLUMNS]
     rows = cloud_rows(message, known)
     classes = [name for name in rows.dtype.names if name not in known]
     p = np.empty((len(rows), len(classes)), np.uint8)
     for c, name in enumerate(classes):
         p[:, c] = rows[name]
-    return PixelProbabilities(rows['camera'].astype(np.uint8),
-                              np.stack([rows['u'], rows['v']], -1).astype(np.uint16), p)
+    camera, uv = rows['camera'].astype(np.int64), np.stack([rows['u'], rows['v']], -1)
+    if observation is not None:
+        sizes = np.array([view.depth.shape[::-1] for view in observation.views])
+        if len(rows) and (camera.max() >= len(sizes) or (uv >= sizes[camera]).any()):
+            raise HoocError('pixels/probabilities names pixels that the views do not have; give '
+                            'all nodes the same parameter cameras')
+    if n_models is not None and len(classes) != n_models + 1:
+        raise HoocError(f'pixels/probabilities has {len(classes) - 1} categories, but the model '
+                        f'{n_models}; give all nodes the same parameter model')
+    return PixelProbabilities(camera.astype(np.uint8), uv.astype(np.uint16), p)
 
 
 def label_images(probabilities, observation):
@@ -87,21 +100,30 @@ def candidates_messages(candidates, head, turn=0):
             cloud_message(rows, head))
 
 
-def candidates_from_messages(poses, attributes):
+def candidates_from_messages(poses, attributes, n_models=None):
     """
     Return the Candidates of their two messages, exactly.
 
     Objects carry the same columns and more, so this reads `objects/*` as well.
 
-    :raises HoocError: where the two do not belong together.
+    :param n_models: how many categories there are; compiled code trusts the class ids.
+    :raises HoocError: where the two do not belong together, or are no candidates.
     """
     translation, rotation = poses_from_message(poses)
     rows = cloud_rows(attributes, [name for name, _ in CANDIDATE_COLUMNS])
     if len(rows) != len(translation) or attributes.header.stamp != poses.header.stamp:
         raise HoocError(f'{len(translation)} poses came with {len(rows)} rows of attributes; two '
                         'nodes are publishing on the same topics')
-    return Candidates(rows['category'].astype(np.uint16), translation, rotation,
-                      np.stack([rows[name] for name in SIZE], -1).astype(np.float32),
+    category, size = rows['category'], np.stack([rows[name] for name in SIZE], -1)
+    if n_models is not None and len(rows):
+        if category.min() < 1 or category.max() > n_models:
+            raise HoocError(f'candidates of a category that the model with its {n_models} does '
+                            'not have; give all nodes the same parameter model')
+        if not (np.isfinite(translation).all() and np.isfinite(size).all() and (size > 0).all()
+                and (np.abs(np.linalg.norm(rotation, axis=1) - 1) < 1e-3).all()):
+            raise HoocError('candidates whose poses or sizes are none; is another node '
+                            'publishing on their topics?')
+    return Candidates(category.astype(np.uint16), translation, rotation, size.astype(np.float32),
                       rows['score'].astype(np.float32))
 
 

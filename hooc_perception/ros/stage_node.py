@@ -2,13 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the lifecycle nodes share: parameters, transitions that explain failures, endpoints."""
 
+import ctypes
 from dataclasses import dataclass, field
+import functools
+import gc
 import json
 import os
+import sys
+import time
+import traceback
 
 from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.diagnostics import Diagnostics
+from hooc_perception.ros.misaddressed import misaddressed
 from hooc_perception.ros.parameters import Parameters
 from hooc_perception.ros.qos import overridable, qos
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -56,7 +63,9 @@ class StageNode(LifecycleNode):
         """Declare all parameters; `kwargs` go to rclpy.node.Node."""
         super().__init__(name, **{'namespace': '/hooc', **kwargs})
         self.active = False
+        self.since = 0.0            # monotonic seconds of the last activation
         self._mine = []
+        self._before = set(vars(self)) | {'parameters', 'diagnostics'}
         self.parameters = Parameters(self, self.is_unconfigured)
         self.diagnostics = Diagnostics(self)
         self.parameters.declare('', config)
@@ -103,7 +112,7 @@ class StageNode(LifecycleNode):
 
     def subscription(self, kind, topic, callback, name=None):
         """Return a subscription on `name` with the QoS of the table's row `topic`."""
-        made = self.create_subscription(kind, name or topic, callback, qos(topic),
+        made = self.create_subscription(kind, name or topic, self.guarded(callback), qos(topic),
                                         qos_overriding_options=overridable())
         self._mine.append((self.destroy_subscription, made))
         return made
@@ -112,6 +121,24 @@ class StageNode(LifecycleNode):
         """Have `destroy(made)` called by cleaning up; return `made`."""
         self._mine.append((destroy, made))
         return made
+
+    def guarded(self, callback):
+        """
+        Return a callback of one message that survives whatever the message causes.
+
+        A node runs for days: an error that nobody has thought of costs one message, is said and
+        counted, and its traceback logged.
+        """
+        @functools.wraps(callback)
+        def survive(message):
+            try:
+                callback(message)
+            except Exception as error:
+                self.diagnostics.error('input', 'unexpected', (
+                    f'unexpected {type(error).__name__}: {error}; the message is dropped; please '
+                    'report this with the traceback'))
+                self.get_logger().info(traceback.format_exc(), throttle_duration_sec=60.0)
+        return survive
 
     # Hooks of the sub-classes.
 
@@ -131,10 +158,13 @@ class StageNode(LifecycleNode):
 
     def on_configure(self, state):
         """Build, or say why not and undo the half of it."""
+        self._before = set(vars(self))
+
         def build():
             self.configure()
             LifecycleNode.on_configure(self, state)
         if self._attempt('configure', build):
+            self._report_misaddressed()
             return TransitionCallbackReturn.SUCCESS
         self._destroy()
         return TransitionCallbackReturn.FAILURE
@@ -142,6 +172,7 @@ class StageNode(LifecycleNode):
     def on_activate(self, state):
         """Let the publishers speak and the callbacks work."""
         def start():
+            self.since = time.monotonic()
             LifecycleNode.on_activate(self, state)
             self.activate()
             self.active = True
@@ -185,8 +216,30 @@ class StageNode(LifecycleNode):
                                     f'unexpected {type(error).__name__}: {error}')
         return False
 
+    def _report_misaddressed(self):
+        """Say which parameters were given and are taken by nobody."""
+        wrong = misaddressed(self._parameter_overrides, self._parameters)
+        if wrong:
+            self.diagnostics.warn('parameters', 'unknown_parameter', '; '.join(wrong))
+
     def _destroy(self):
+        """Destroy the endpoints, forget what was built and give its memory back."""
         self.cleanup()
         while self._mine:
             destroy, made = self._mine.pop()
             destroy(made)
+            del made
+        for name in set(vars(self)) - self._before:
+            if not name.startswith('_'):
+                delattr(self, name)
+        gc.collect()
+        _trim()
+
+
+def _trim():
+    """Have the C library give free memory back to the system, where it can."""
+    if sys.platform == 'linux':
+        try:
+            ctypes.CDLL('libc.so.6').malloc_trim(0)
+        except (OSError, AttributeError):
+            pass    # another C library

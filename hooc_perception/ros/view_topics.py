@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The topics views/*: rectified frame sets, from ingestion to the later nodes, bit for bit."""
 
+import time
+
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.core.geometry import back_project, pose_from_matrix
 from hooc_perception.core.observe import observe
@@ -13,6 +15,7 @@ from hooc_perception.ros.conversions import (
     depth_from_message,
     depth_message,
     header,
+    labels_message,
     nanoseconds,
     transform_message,
 )
@@ -21,6 +24,9 @@ from hooc_perception.ros.stage_messages import points_message
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 
+EXPLAIN_AFTER_S = 3.0
+_MAKERS = {'views': 'ingestion_node', 'pixels': 'classification_node',
+           'candidates': 'candidate_node'}
 _KINDS = (('camera_info', CameraInfo), ('extrinsics', TransformStamped), ('depth_rect', Image))
 
 
@@ -33,14 +39,22 @@ class ViewOutput:
                                                   f'views/{name}/{suffix}')
                                    for suffix, kind in _KINDS] for name in names}
         self._points = node.publisher(PointCloud2, 'views/points')
+        self._counts = {name: node.publisher(Image, 'views/<camera>/count', f'views/{name}/count')
+                        for name in names}
 
-    def publish(self, stamp_ns, target_frame, views, frames):
+    def publish(self, stamp_ns, target_frame, views, frames, counts=()):
         """
         Publish one frame set.
 
         :param views: RectifiedView a camera.
         :param frames: frame_id of each camera's optical frame.
+        :param counts: (H, W) uint8 readings that each pixel is the median of, None where
+            nothing was fused.
         """
+        for view, frame, count in zip(views, frames, counts):
+            if count is not None:
+                self._counts[view.camera.name].publish(
+                    labels_message(count, header(stamp_ns, frame)))
         for view, frame in zip(views, frames):
             head = header(stamp_ns, frame)
             info, extrinsics, depth = self._publishers[view.camera.name]
@@ -85,11 +99,30 @@ class ViewInput:
                                   f'views/{name}/{suffix}')
         for part, (kind, topic) in others.items():
             node.subscription(kind, topic, self._taker(self._whole, part, self._deliver))
+        self._needed = [*(f'views/{name}/depth_rect' for name in names),
+                        *(topic for _, topic in others.values())]
+        node.owned(node.destroy_timer, node.create_timer(1.0, self._explain))
 
     def clear(self):
         """Forget what waits."""
         self._views.clear()
         self._whole.clear()
+
+    def _explain(self):
+        """Say which node is missing, or works for other cameras."""
+        node = self._node
+        if not node.active or time.monotonic() - node.since < EXPLAIN_AFTER_S:
+            return
+        silent = [topic for topic in self._needed if not node.count_publishers(topic)]
+        if not silent:
+            return
+        makers = dict.fromkeys(_MAKERS[topic.partition('/')[0]] for topic in silent)
+        sentence = (f'nobody publishes {", ".join(map(node.resolve_topic_name, silent))}, so '
+                    f'nothing can be done; start {" and ".join(makers)}')
+        if silent[0].startswith('views/'):
+            sentence += (', with the same parameter cameras in every node (here: '
+                         f'{", ".join(self._names)})')
+        node.diagnostics.warn('input', 'no_publisher', sentence)
 
     def _taker(self, join, part, then):
         def take(message):
@@ -120,4 +153,5 @@ class ViewInput:
         self._add(self._whole, 'observation', stamp_ns, observation, self._deliver)
 
     def _deliver(self, stamp_ns, parts):
+        self._node.diagnostics.ok('input')
         self._callback(stamp_ns, parts['observation'], parts)

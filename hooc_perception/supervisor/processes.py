@@ -68,6 +68,10 @@ class NodeProcess:
         """Send SIGINT, which rclpy turns into an orderly end."""
         self._signal(signal.SIGINT)
 
+    def kill(self):
+        """End it at once; the keeper notices."""
+        self._signal(signal.SIGKILL)
+
     def stop(self, deadline):
         """
         Make sure that it has ended.

@@ -4,12 +4,15 @@
 
 from pathlib import Path
 import signal
+import sys
 import time
 
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.parameters import parameter_message
 from hooc_perception.supervisor.environment import isolate, use_large_segments
+from hooc_perception.supervisor.params_file import unreached_sections
 from hooc_perception.supervisor.processes import NodeProcess
+from hooc_perception.supervisor.shared_memory import free_orphans
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import SetParametersAtomically
@@ -50,7 +53,8 @@ class Supervisor:
         :param params_file: YAML of the user; `parameters` win over it.
         :param modules: {node name: module}, in tests.
         """
-        self.names, self._parameters, self.namespace = tuple(names), parameters or {}, namespace
+        self.names, self.namespace = tuple(names), namespace
+        self._parameters = {name: dict(values) for name, values in (parameters or {}).items()}
         self._isolated, self._verbose, self._modules = isolated, verbose, modules or {}
         self._params_file = Path(params_file) if params_file else None
         if self._params_file and not self._params_file.is_file():
@@ -100,10 +104,12 @@ class Supervisor:
         if self._isolated:
             self._claim = isolate()
         use_large_segments(len(self.names) + 1)
+        free_orphans()
+        if self._params_file:
+            for sentence in unreached_sections(self._params_file, self.names, self.namespace):
+                print(f'[WARN] {sentence}', file=sys.stderr, flush=True)
         for name in self.names:
-            self.processes[name] = NodeProcess(
-                name, self._parameters.get(name, {}), self.namespace, self._params_file,
-                self._verbose, self._modules.get(name))
+            self.start_process(name)
         self._context = rclpy.Context()
         # Signals are ours: rclpy would only shut its context down and leave the nodes.
         rclpy.init(args=['--ros-args', '--disable-external-lib-logs'], context=self._context,
@@ -124,12 +130,30 @@ class Supervisor:
             # a node that has accepted all of them.
             self.state(name, START_TIMEOUT_S, complaint)
 
+    def start_process(self, name):
+        """Start the process of a node, with all parameters that are known of it."""
+        self.processes[name] = NodeProcess(
+            name, self._parameters.get(name, {}), self.namespace, self._params_file,
+            self._verbose, self._modules.get(name))
+
+    def remember(self, name, values):
+        """Note parameters that were changed, for a process that has to be started again."""
+        self._parameters[name] = {**self._parameters.get(name, {}), **values}
+
     # Talking to the nodes.
+
+    def client(self, name, kind):
+        """Return the client of a node's service GetState, ChangeState or the parameters."""
+        return self._clients[name, kind]
 
     def spin(self, seconds=0.05):
         """Serve callbacks for a moment; raise HoocError where a node has died."""
-        self._executor.spin_once(timeout_sec=seconds)
+        self.spin_unchecked(seconds)
         self.check()
+
+    def spin_unchecked(self, seconds=0.05):
+        """Serve callbacks for a moment, whoever has died."""
+        self._executor.spin_once(timeout_sec=seconds)
 
     def dead(self):
         """Return the names of the nodes whose process has ended."""
@@ -219,6 +243,7 @@ class Supervisor:
                            f'{name} does not answer').result
         if not result.successful:
             raise HoocError(f'{name}: {result.reason}')
+        self.remember(name, values)
 
     def _ask(self, name, kind, request, timeout_s, complaint):
         """Return the response to a request that may be repeated, and is every RETRY_S."""

@@ -149,10 +149,20 @@ def test_the_rectified_pose_survives_a_quaternion(desk):
                                       canonical_pose(raw.camera.T_world_camera))
 
 
-def test_an_image_without_a_reading_is_refused_by_its_cameras_name(desk):
+def test_a_camera_without_a_reading_changes_nothing_for_the_others(desk):
     views = rectified(desk)
+    before = observe([views[0], views[2]])
     views[1] = replace(views[1], depth=np.full_like(views[1].depth, np.nan))
-    with pytest.raises(HoocError, match='camera1 holds no reading'):
+    after = observe(views)
+    assert after.noise_m == before.noise_m and not after.views[1].foreground.any()
+    for i, k in ((0, 0), (1, 2)):
+        np.testing.assert_array_equal(after.views[k].foreground, before.views[i].foreground)
+        np.testing.assert_array_equal(after.views[k].background, before.views[i].background)
+
+
+def test_images_without_a_reading_are_refused_by_their_cameras_name(desk):
+    views = [replace(view, depth=np.full_like(view.depth, np.nan)) for view in rectified(desk)]
+    with pytest.raises(HoocError, match='camera0 holds no reading'):
         observe(views)
     zeros = DepthView(desk.cameras[2], np.zeros((120, 160), np.float32))
     with pytest.raises(HoocError, match='camera2 holds no reading'):

@@ -239,6 +239,42 @@ def test_truncated_file(sound, tmp_path):
     storage = next(folder.glob('*.mcap'))
     storage.write_bytes(storage.read_bytes()[:-20000])
     assert 'truncated' in found(folder, ERROR)
+    assert 'can still be read; save them' in found(folder, WARNING)
+
+
+def test_a_damaged_bag_is_salvaged_and_checked_again(sound, tmp_path, capsys):
+    folder = rewritten(sound, tmp_path / 'bag')
+    storage = next(folder.glob('*.mcap'))
+    storage.write_bytes(storage.read_bytes()[:-20000])
+    (folder / 'metadata.yaml').unlink()
+    out = tmp_path / 'saved'
+    assert main(['doctor', str(folder), '--salvage', str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert 'messages saved' in printed and '0 errors' in printed
+    assert len(list(iter_messages(out))) > 10
+    assert main(['doctor', str(folder), str(sound), '--salvage', str(out)]) == 1
+    storage.write_bytes(b'')
+    assert main(['doctor', str(folder), '--salvage', str(tmp_path / 'none')]) == 1
+    assert 'no message can be read' in ''.join(capsys.readouterr())
+
+
+@pytest.mark.parametrize('cameras, word', [(3, 'can be used'), (2, 'trained for 2 cameras')])
+def test_models_that_do_not_fit_the_rig(sound, cameras, word):
+    from hooc_perception.core.classify import KIND_PAPER
+    from hooc_perception.diagnosis.bag import check_rig
+    model = SimpleNamespace(name='m', classifier={'kind': np.array(KIND_PAPER)}, cameras=tuple(
+        camera_above(f'camera{i}', i * 2.1) for i in range(cameras)))
+    (finding,) = check_rig(sound, model)
+    assert word in finding.text and finding.level == (OK if cameras == 3 else WARNING)
+
+
+def test_metres_in_whole_numbers(sound, tmp_path):
+    def edit(topic, message, i):
+        if topic.endswith('image_raw'):
+            metres = np.rint(message.data.view('<u2') / 1000).astype('<u2')
+            message.data = metres.view(np.uint8)
+        return message
+    assert 'seems to hold metres' in found(rewritten(sound, tmp_path / 'bag', edit), ERROR)
 
 
 def test_missing_bag_and_exit_codes(sound, tmp_path, capsys):

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 from hooc_perception.core.geometry import inverse, transform
 from hooc_perception.core.render import render_depth
+from hooc_perception.core.symmetry import symmetry_rotations
 from hooc_perception.core.types import RectifiedView
 from hooc_perception.evaluation.errors import diameter, mspd, mssd, vsd
 from hooc_perception.evaluation.matching import PosedObject
-from hooc_perception.evaluation.symmetry import symmetry_rotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 from hooc_perception.core.observe import ObserveConfig
 from hooc_perception.core.types import Energy, PixelProbabilities
 from hooc_perception.evaluation import rerun as rerun_module
-from hooc_perception.evaluation.paper_tables import energy_table, stage_table
+from hooc_perception.evaluation.paper_tables import energy_table
+from hooc_perception.evaluation.stage_tables import stage_category_table, stage_table
 from hooc_perception.evaluation.stages import as_candidates, true_classes
 from hooc_perception.evaluation.tables import to_text
 from hooc_perception.models.derive import derive
@@ -73,6 +74,13 @@ def test_losses_are_where_the_chain_loses(chain, tiny, folder):
         # Depth is rendered from the truth, and every pixel has its class.
         assert energies[name].depth < 0.05 and energies[name].probability < 0.05
     assert 'ranked 1st' in to_text(stage_table(losses))
+    rows = {row[0]: row for row in stage_category_table(losses, list(tiny.category_names)).rows}
+    # The chain leaves out the first object of either scene: the ball, and one of two boxes.
+    assert {name: (row[1], row[4], row[-1]) for name, row in rows.items()} == {
+        'ball': (1, 1, 0), 'box': (2, 2, 1), 'can': (2, 2, 2)}
+    assert [row[0] for row in stage_category_table(losses, list(tiny.category_names)).rows] == [
+        'ball', 'box', 'can']
+    assert all(row[2] > 50 and row[3] == 1 for row in rows.values())
 
 
 def test_energy_of_the_truth_alone(chain, tiny, folder):

@@ -82,6 +82,21 @@ def test_shuffled_truth_does_not(tiny, models, truth_results):
     assert e.masks[0].explained < 3
 
 
+def test_swapped_categories_and_turned_objects_lose_what_they_should(tiny, models,
+                                                                    truth_results):
+    box = truth_results['scenes'][0]['objects'][1]
+    assert box['category'] == 'box'
+    box['rotation_xyzw'] = [0, 0, np.sqrt(0.5), np.sqrt(0.5)]
+    truth_results['scenes'][1]['objects'][1]['category'] = 'ball'
+    e = evaluate_results(tiny, truth_results, models, 'spoilt', table_1(tiny, models))
+    first, second = e.scores
+    assert (first.found, first.localized, first.false_categories) == (1, 1, 0)
+    # The box stood at 0.4 rad; its quarter turn back to 90 degrees is an error up to half turns.
+    assert first.objects[1].rotation_rad == pytest.approx(np.pi / 2 - 0.4, abs=1e-6)
+    assert (second.found, second.localized, second.false_categories) == (0.5, 0.5, 1)
+    assert e.bop.average < 0.9 and (e.bop.mssd, e.bop.vsd) < (1, 1)
+
+
 def test_missing_scene_counts_as_empty(tiny, models, truth_results):
     del truth_results['scenes'][1]
     e = evaluate_results(tiny, truth_results, models)

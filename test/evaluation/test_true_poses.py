@@ -2,11 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Setting B: which candidates make room for the true poses."""
 
-from hooc_perception.core.types import Candidates
+from pathlib import Path
+
+from hooc_perception.core.classify import classify
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.observe import observe, rectify
+from hooc_perception.core.parse import parse
+from hooc_perception.core.profiles import profile
+from hooc_perception.core.types import Candidates, PixelProbabilities
+from hooc_perception.evaluation.matching import posed
+from hooc_perception.evaluation.scores import score_scene
+from hooc_perception.evaluation.stages import as_candidates, as_objects, true_classes
 from hooc_perception.evaluation.true_poses import with_true_poses
+from hooc_perception.models.derive import derive
+from hooc_perception.models.folder import load_model_folder
+from hooc_perception.replay.bag_reader import BagScene
 from hooc_perception.scenes.scene import TrueObject
 import numpy as np
 import pytest
+import trimesh
+
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def true_object(category, x):
@@ -66,3 +82,50 @@ def test_no_truth_changes_nothing_and_unknown_categories_are_left_out(ordered):
     pool = pool_of((1, 0.9), (2, 0.1))
     for truth in ([], [true_object('teapot', 7.0)]):
         assert with_true_poses(truth, ordered)(pool).translation[:, 0].tolist() == [0, 1]
+
+
+def unsure_probabilities(observation, truths, models):
+    """Return probabilities that give the true class of a pixel a half, the others the rest."""
+    rng, parts, classes = np.random.default_rng(0), [], len(models) + 1
+    for j, view in enumerate(observation.views):
+        v, u = np.nonzero(view.foreground)
+        p = 0.5 * rng.dirichlet(np.ones(classes), len(u))
+        true = true_classes(truths, models, view)[v, u]
+        p[np.arange(len(u)), np.maximum(true, 0)] += 0.5
+        parts.append((np.full(len(u), j, np.uint8), np.stack([u, v], 1).astype(np.uint16),
+                      np.rint(255 * p).astype(np.uint8)))
+    return PixelProbabilities(*(np.concatenate(x) for x in zip(*parts)))
+
+
+def answer_of(name, observation, probabilities, truths, models):
+    """Return the SceneScore of a profile's parsing that knows only the true poses."""
+    only_true = as_candidates(truths, models)
+    parsed = parse(observation, probabilities, only_true, models, profile(name).parse,
+                   stage_rng(0, 'parse'), 1)
+    return score_scene('scene', as_objects(parsed.objects, models), truths,
+                       {m.name: m for m in models})
+
+
+@pytest.mark.parametrize('name', ['paper', 'best', 'fast'])
+def test_with_only_true_poses_every_object_is_found(name, models, tiny, posed_truths):
+    rng = np.random.default_rng(0)
+    derived = tuple(derive(m.name, trimesh.Trimesh(m.vertices, m.faces), rng)
+                    for m in models.values())
+    for scene in tiny.scenes[:2]:
+        truths = posed_truths[scene.name]
+        observation = observe([rectify(view) for view in scene.depth()])
+        probabilities = unsure_probabilities(observation, truths, derived)
+        score = answer_of(name, observation, probabilities, truths, derived)
+        assert (score.found, score.localized, score.tight) == (1, 1, 1)
+        assert score.estimated == len(truths)
+
+
+@pytest.mark.parametrize('name', ['best', 'fast'])
+def test_with_only_true_poses_all_ten_of_the_bundled_scene_are_found(name):
+    # Other shapes than the generic models, sensor noise, and what a small forest makes of it.
+    scene, folder = BagScene(ROOT / 'bags' / 'demo'), load_model_folder(ROOT / 'models' / 'demo')
+    observation = observe([rectify(view) for view in scene.views()])
+    probabilities = classify(observation, folder.classifier)
+    score = answer_of(name, observation, probabilities, [posed(t) for t in scene.truth],
+                      folder.models)
+    assert (score.found, score.localized, score.estimated) == (1, 1, 10)

@@ -112,8 +112,8 @@ def chain(bench, folder, monkeypatch):
                       and peer.count_subscribers(depth_topic) == 3)
     bench.rest(0.3)
 
-    def send():
-        stamp = peer.get_clock().now().nanoseconds
+    def send(shift_s=0.0):
+        stamp = peer.get_clock().now().nanoseconds + int(shift_s * 1e9)
         head = c.header(stamp, 'overhead_optical')
         infos.publish(c.camera_info_message(camera, head))
         images.publish(c.depth_message(stages.views[0].depth, head))
@@ -220,14 +220,30 @@ def test_empty_tables_are_answers_and_markers_go(chain):
     assert heard['objects/can/poses'][-1].poses == []
 
 
-def test_ids_are_never_used_twice(chain):
+def test_ids_stay_with_objects_until_they_are_reset(chain):
     stages, bench, send = chain
     heard = heard_answer(bench, stages)
-    for i in range(3):
+
+    def ids(chosen):
+        before = {topic: len(messages) for topic, messages in heard.items()}
+        stages.chosen = chosen
         send()
-        assert bench.spin(lambda: len(heard['objects/attributes']) == i + 1)
-    ids = np.concatenate([cloud_rows(m)['id'] for m in heard['objects/attributes']])
-    assert len(set(ids.tolist())) == 6
+        assert bench.spin(lambda: all(len(heard[topic]) > n for topic, n in before.items()))
+        return cloud_rows(heard['objects/attributes'][-1])['id'].tolist()
+
+    box, can = ids([0, 2])
+    assert ids([2, 0]) == [can, box]
+    # A viewer is told of what is gone, and of nothing else.
+    assert [m.action for m in heard['objects/markers'][-1].markers] == [Marker.ADD] * 2
+    assert ids([0]) == [box]
+    gone = [m for m in heard['objects/markers'][-1].markers if m.action == Marker.DELETE]
+    assert [(m.ns, m.id) for m in gone] == [('can', can)]
+    assert ids([2]) == [can]
+    labels = json.loads(heard['objects/labels'][-1].data)
+    assert labels['objects'] == {str(can): {'category': 'can', 'class_id': 3}}
+    assert bench.spin(call(bench, Trigger, 'reset').done)
+    bench.rest(0.3)
+    assert not {box, can} & set(ids([0, 2]))
 
 
 def call(bench, kind, name, **fields):
@@ -265,6 +281,63 @@ def test_detect_gives_up(chain):
     assert not future.result().success and 'cameras' in future.result().message
 
 
+def test_detect_gives_up_while_simulated_time_stands_still(chain):
+    stages, bench, send = chain
+    from rclpy.parameter import Parameter
+    bench.chain[3].set_parameters([Parameter('detect_timeout_s', value=0.3),
+                                   Parameter('use_sim_time', value=True)])
+    future = call(bench, Trigger, 'detect')
+    assert bench.spin(future.done) and not future.result().success
+
+
+def test_detect_refuses_at_once_what_nobody_will_answer(chain):
+    stages, bench, send = chain
+    waiting = call(bench, Trigger, 'detect')
+    bench.rest(0.2)
+    assert bench.spin(call(bench, SetBool, 'enable', data=False).done)
+    assert bench.spin(waiting.done) and 'ignored' in waiting.result().message
+    future = call(bench, Trigger, 'detect')
+    assert bench.spin(future.done, 1.0)
+    assert not future.result().success and 'enable' in future.result().message
+    assert bench.spin(call(bench, SetBool, 'enable', data=True).done)
+    waiting = call(bench, Trigger, 'detect')
+    bench.rest(0.2)
+    bench.chain[3].trigger_deactivate()
+    assert bench.spin(waiting.done, 1.0) and 'deactivated' in waiting.result().message
+    assert bench.spin(call(bench, Trigger, 'detect').done, 1.0)
+
+
+def test_detect_survives_a_clock_that_is_set_back(chain):
+    stages, bench, send = chain
+    from rclpy.parameter import Parameter
+    bench.chain[0].set_parameters([Parameter('max_frame_age_s', value=0.0)])
+    heard = heard_answer(bench, stages)
+    send()
+    assert bench.spin(lambda: heard['objects/poses'])
+    future = call(bench, Trigger, 'detect')
+    bench.rest(0.2)
+    bench.chain[0].sent = None
+    send(-100.0)        # a bag that starts again
+    assert bench.spin(future.done)
+    assert future.result().success, future.result().message
+
+
+@pytest.mark.parametrize('parameter, value, package', [
+    ('publish_tf', True, 'tf2_msgs'), ('publish_detections', True, 'vision_msgs'),
+    ('planning_scene', 'box', 'moveit_msgs')])
+def test_packages_that_are_not_there_are_missed_when_configuring(bench, folder, parameter, value,
+                                                                 package):
+    try:
+        __import__(f'{package}.msg')
+        pytest.skip(f'{package} is installed')
+    except ImportError:
+        pass
+    node = bench.add(parsing_node.ParsingNode, model=str(folder.path), warm_up=False,
+                     **{parameter: value})
+    assert node.trigger_configure() == TransitionCallbackReturn.FAILURE
+    assert package in bench.reasons(node)['node'][1]
+
+
 def test_enable_and_reset(chain):
     stages, bench, send = chain
     heard = heard_answer(bench, stages)
@@ -279,6 +352,12 @@ def test_enable_and_reset(chain):
     assert bench.spin(lambda: heard['objects/poses'] and heard['objects/markers'])
     assert bench.spin(call(bench, Trigger, 'reset').done)
     assert bench.spin(lambda: heard['objects/markers'][-1].markers[0].action == Marker.DELETEALL)
+    # Who acts on the answer learns that it is void, in every form that it has.
+    assert bench.spin(lambda: heard['objects/poses'][-1].poses == [])
+    assert heard['objects/attributes'][-1].width == 0
+    assert heard['objects/can/poses'][-1].poses == []
+    assert heard['scene/unexplained'][-1].width == 0
+    assert json.loads(heard['objects/labels'][-1].data)['objects'] == {}
 
 
 def test_a_refusing_stage_says_why_and_the_next_set_is_parsed(chain):

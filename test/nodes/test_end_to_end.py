@@ -32,8 +32,9 @@ def bundle(request):
 
 
 @pytest.fixture(scope='module')
-def played(bundle):
-    """Return (Answer, Answer of a second play, what a late subscriber printed)."""
+def played(bundle, tmp_path_factory):
+    """Return (Answer, Answer of a second play, prints of two late subscribers, recording)."""
+    from hooc_perception.models.folder import load_model_folder
     from hooc_perception.replay.bag_reader import BagScene
     from hooc_perception.supervisor import environment
     from hooc_perception.supervisor.bags import BagRunner, LISTENERS
@@ -53,12 +54,21 @@ def played(bundle):
             # No `hooc`, no package of ours: only the environment that says which domain.
             late = subprocess.Popen([sys.executable, '-I', str(HERE / 'late_subscriber.py')],
                                     stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-            supervisor.wait(lambda: late.poll() is not None, 40.0, 'it does not end')
+            surest = int(first.parsed.objects.score.argmax())
+            example = subprocess.Popen(
+                [sys.executable, '-I', str(HERE.parents[1] / 'examples' / 'pick_target.py'),
+                 load_model_folder(model).models[first.parsed.objects.category[surest] - 1].name,
+                 '--score', '0', '--max-age', '600'],
+                stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+            for process in (late, example):
+                supervisor.wait(lambda p=process: p.poll() is not None, 60.0, 'it does not end')
+            runner._record = tmp_path_factory.mktemp('bags') / 'out'
             second = runner.play(BagScene(bag))
     finally:
         os.environ.clear()
         os.environ.update(before)
-    return first, second, late.stdout.read()
+    return (first, second, late.stdout.read(), example.stdout.read(),
+            runner._record / BagScene(bag).name)
 
 
 def test_nodes_and_one_process_find_the_same_objects(bundle, played):
@@ -101,3 +111,36 @@ def test_a_late_subscriber_can_name_every_object(bundle, played):
     np.testing.assert_array_equal([t['translation'] for t in told], found.translation)
     np.testing.assert_array_equal(np.float32([t['size'] for t in told]), found.size)
     assert np.isfinite([t['score'] for t in told]).all()
+
+
+def test_the_example_of_a_planner_waits_above_the_surest_object(played):
+    target, found = json.loads(played[3]), played[0].parsed.objects
+    surest = int(found.score.argmax())
+    np.testing.assert_allclose(target['position'][:2], found.translation[surest, :2], atol=1e-6)
+    above = target['position'][2] - found.translation[surest, 2]
+    assert 0.1 < above < 0.1 + found.size[surest].max()
+    assert target['frame'] == 'table' and target['score'] == pytest.approx(found.score[surest])
+
+
+def test_a_recording_holds_the_answer_and_is_a_bag_like_any_other(bundle, played):
+    from hooc_perception.replay.bag_reader import BagScene
+    from mcap.reader import make_reader
+    from rosbags.typesys import get_typestore, Stores
+    store, last, counts = get_typestore(Stores.ROS2_JAZZY), {}, {}
+    file, = played[4].glob('*.mcap')
+    with open(file, 'rb') as stream:
+        for schema, channel, message in make_reader(stream).iter_messages():
+            counts[channel.topic] = counts.get(channel.topic, 0) + 1
+            last[channel.topic] = store.deserialize_cdr(message.data, schema.name)
+    found = played[1].parsed.objects
+    assert counts['/hooc/objects/poses'] == 1       # not what was latched of the scene before
+    poses = last['/hooc/objects/poses'].poses
+    np.testing.assert_array_equal(
+        [(p.position.x, p.position.y, p.position.z) for p in poses], found.translation)
+    assert last['/hooc/objects/attributes'].width == len(found)
+    assert json.loads(last['/hooc/scene/summary'].data)['stamp_ns'] == played[1].stamp_ns
+    for topic in ('pixels/probabilities', 'candidates/poses', 'objects/markers',
+                  'objects/labels', 'scene/unexplained'):
+        assert f'/hooc/{topic}' in counts, topic
+    for mine, theirs in zip(BagScene(played[4]).views(), BagScene(bundle[0]).views()):
+        np.testing.assert_array_equal(mine.depth, theirs.depth)

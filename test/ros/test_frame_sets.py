@@ -93,10 +93,10 @@ def test_old_frames_are_stale_at_once():
     assert assembly.drops == {(camera, 'stale'): 1 for camera in 'abc'}
 
 
-def test_frames_grow_stale_while_they_wait():
+def test_frames_expire_while_they_wait():
     assembly = sets(max_frame_age_s=0.5, max_set_spread_s=10.0)
     assert feed(assembly, 'a 0', 'b 0', 'c 700') == []
-    assert assembly.drops == {('a', 'stale'): 1, ('b', 'stale'): 1}
+    assert assembly.drops == {('a', 'expired'): 1, ('b', 'expired'): 1}
 
 
 def test_age_zero_accepts_any_age():
@@ -208,3 +208,134 @@ def test_repeated_part_replaces():
     j.add('views', 1, 'old')
     j.add('views', 1, 'new')
     assert j.add('pixels', 1, 'p')['views'] == 'new'
+
+
+# Cameras that drop out. Frames every 33 ms; `feed` takes with each of them.
+
+def stream(cameras, start_ms, stop_ms, period_ms=33, shift=()):
+    """Return frames of free-running cameras as `feed` wants them, in the order of time."""
+    shift = dict(shift)
+    frames = [(t + i, f'{camera} {t + i + shift.get(camera, 0)}')
+              for t in range(start_ms, stop_ms, period_ms) for i, camera in enumerate(cameras)]
+    return [text for _, text in sorted(frames)]
+
+
+def test_a_camera_that_vanishes_is_left_out_and_comes_back():
+    assembly = sets(camera_timeout_s=0.5)
+    assert all(None not in s.frames for s in feed(assembly, *stream('abc', 0, 1000)))
+    alone = feed(assembly, *stream('ab', 1000, 3000))
+    assert assembly.lost == {'c': 'silent'}
+    # Half a second of waiting, then every set.
+    assert {s.frames.index(None) for s in alone} == {2}
+    assert 40 < len(alone) < 50
+    assert assembly.drops['c', 'spread'] == 0
+    again = feed(assembly, *stream('abc', 3000, 4000))
+    assert assembly.lost == {} and all(None not in s.frames for s in again[1:])
+
+
+@pytest.mark.parametrize('period', [33, 500, 1000])
+def test_it_comes_back_at_any_rate(period):
+    assembly = sets(camera_timeout_s=2.0)
+    feed(assembly, *stream('ab', 0, 10000, period))
+    assert assembly.lost == {'c': 'silent'}
+    again = feed(assembly, *stream('abc', 10000, 20000, period))
+    assert assembly.lost == {} and None not in again[-1].frames
+
+
+def test_a_camera_that_never_came_is_not_waited_for_forever():
+    out = feed(sets(camera_timeout_s=0.5), *stream('bc', 0, 2000))
+    assert len(out) > 40 and all(s.frames[0] is None for s in out)
+
+
+def test_two_of_three_may_vanish():
+    assembly = sets(camera_timeout_s=0.5)
+    feed(assembly, *stream('abc', 0, 500), *stream('ab', 500, 2000))
+    out = feed(assembly, *stream('b', 2000, 4000))
+    assert assembly.lost == {'a': 'silent', 'c': 'silent'}
+    assert out[-1].frames == (None, out[-1].frames[1], None)
+
+
+def test_fewer_than_asked_for_are_no_set():
+    assembly = sets(camera_timeout_s=0.5, min_cameras=2)
+    assert feed(assembly, *stream('b', 0, 3000)) == []
+    assert feed(assembly, *stream('ab', 3000, 6000))
+
+
+def test_timeout_zero_always_waits():
+    assembly = sets(camera_timeout_s=0.0)
+    assert feed(assembly, *stream('ab', 0, 20000)) == [] and assembly.lost == {}
+
+
+def test_after_a_pause_of_all_nobody_is_missed():
+    assembly = sets(camera_timeout_s=0.5)
+    feed(assembly, *stream('abc', 0, 500))
+    out = feed(assembly, 'a 20000', 'b 20001', 'c 20002')
+    assert [None in s.frames for s in out] == [False]
+
+
+@pytest.mark.parametrize('offset', [-500, 500])
+def test_a_clock_that_is_off_loses_its_camera_not_the_others(offset):
+    assembly = sets(camera_timeout_s=0.5)
+    frames = [(t + i, camera, t + i + (offset if camera == 'b' else 0))
+              for t in range(0, 4000, 33) for i, camera in enumerate('abc')]
+    out = []
+    for now, camera, stamp in frames:
+        assembly.add(camera, T0 + stamp * MS, camera, T0 + now * MS)
+        out.append(assembly.take(T0 + now * MS))
+    assert assembly.lost == {'b': 'apart'}
+    done = [s.frames for s in out if s]
+    assert len(done) > 80 and set(done) == {('a', None, 'c')}
+    assert assembly.drops['b', 'spread'] > 0
+    # Its clock is set right: it is one of them again.
+    (last,) = feed(assembly, 'a 5100', 'b 5101', 'c 5102')
+    assert None not in last.frames and assembly.lost == {}
+
+
+def test_stamps_of_zero_and_from_the_future():
+    assembly = sets('a', max_frame_age_s=1.0)
+    assert assembly.add('a', 0, 'x', T0) == 'no_stamp'
+    assert assembly.add('a', T0 + 1100 * MS, 'x', T0) == 'future'
+    # It has not spoilt what comes after it.
+    assert assembly.add('a', T0, 'x', T0) is None
+    assert assembly.take(T0).frames == ('x',)
+    assert sets('a', max_frame_age_s=0.0).add('a', 2 * T0, 'x', T0) is None
+
+
+def test_a_clock_that_is_set_back_does_not_stop_the_sets():
+    assembly = sets(max_frame_age_s=1.0, camera_timeout_s=0.5)
+    feed(assembly, *stream('abc', 50000, 52000))
+    assert len(feed(assembly, *stream('abc', 0, 1000))) > 25
+    assert len(feed(assembly, *stream('ab', 1000, 3000))) > 25
+    assert assembly.lost == {'c': 'silent'}
+
+
+@pytest.mark.parametrize('n', range(1, 9))
+def test_one_to_eight_cameras_in_any_mood(n):
+    """Nothing that cameras do stops the rest, and every frame is used or counted."""
+    rng = np.random.default_rng(n)
+    cameras = 'abcdefgh'[:n]
+    assembly = sets(*cameras, camera_timeout_s=0.3)
+    at, given, used, last, longest = T0, 0, 0, T0, 0
+    down = dict.fromkeys(cameras, 0)
+    for i in range(3000):
+        at += int(rng.integers(10, 50)) * MS // n
+        camera = cameras[i % n]
+        if rng.random() < 0.002:
+            down[camera] = at + int(rng.integers(100, 3000)) * MS
+        if at < down[camera]:
+            continue
+        odd = rng.random() < 0.01
+        stamp = at - int(rng.choice([400, 2000, 5000, -2000] if odd else [0, 0, 5, 10])) * MS
+        given += 1
+        lost = assembly.add(camera, stamp if rng.random() > 0.01 else 0, camera, at)
+        frame_set = assembly.take(at)
+        if frame_set:
+            used += sum(frame is not None for frame in frame_set.frames)
+            longest, last = max(longest, at - last), at
+    waiting = n - len(assembly.missing())
+    superseded = assembly.drops.total()
+    assert lost is None or isinstance(lost, str)
+    jumps = sum(number for (_, reason), number in assembly.drops.items() if reason == 'time_jump')
+    # A jump counts even if its camera had nothing that waited.
+    assert given <= used + superseded + waiting <= given + jumps
+    assert used > 0.7 * given and (n == 1 or longest < 2500 * MS)

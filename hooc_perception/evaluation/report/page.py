@@ -9,7 +9,9 @@ from hooc_perception.core.render import render_depth
 from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.shaded import shaded_picture
+from hooc_perception.evaluation.report.space import Meshes, space_json
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from markupsafe import Markup
 import numpy as np
 
 MARGIN = 0.03
@@ -22,7 +24,8 @@ def report_html(scenes, title='What stands on the table', notes=()):
     """
     Return the page (str) of a sequence of ReportScene.
 
-    It needs nothing but itself: pictures are PNGs inside the page, there are no requests.
+    It needs nothing but itself: pictures are PNGs inside the page, the 3D view is drawn by a
+    script inside of it; there are no requests.
 
     :param notes: sentences below the title, such as the profile and the model's name.
     """
@@ -32,9 +35,12 @@ def report_html(scenes, title='What stands on the table', notes=()):
     environment = Environment(loader=FileSystemLoader(Path(__file__).parent), autoescape=True,
                               undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters['pretty'] = lambda name: str(name).replace('_', ' ')
-    shown = [_scene(index, scene, palette) for index, scene in enumerate(scenes)]
+    meshes = Meshes()
+    shown = [_scene(index, scene, palette, meshes) for index, scene in enumerate(scenes)]
+    script = (Path(__file__).parent / 'space.js').read_text(encoding='utf-8')
     return environment.get_template('page.html.j2').render(
         title=title, notes=list(notes), scenes=shown, mean=_mean(shown),
+        meshes=Markup(meshes.json()), script=Markup(script),
         residual_cm=round(pictures.RESIDUAL_M * 100))
 
 
@@ -48,7 +54,7 @@ def write_report(path, scenes, title='What stands on the table', notes=()):
     return path
 
 
-def _scene(index, scene, palette):
+def _scene(index, scene, palette, store):
     """Return what the template shows of one scene."""
     # Categories that have no model cannot be drawn, only listed.
     drawn = [o for o in scene.objects if o.category in scene.models]
@@ -58,6 +64,7 @@ def _scene(index, scene, palette):
     views = [_view(scene, j, drawn, meshes, true, true_meshes, palette)
              for j in range(len(scene.observation.views))]
     scores = scene.scores
+    rows = _rows(scene, scores, palette)
     found = sum(s.estimate is not None for s in scores) if scores else 0
     energy = None
     if scene.energy and all(scene.energy.get(t) is not None for t in TERMS):
@@ -68,13 +75,14 @@ def _scene(index, scene, palette):
     return {
         'id': f's{index}', 'name': scene.name, 'views': views, 'energy': energy,
         'seconds': scene.seconds, 'stages': scene.stage_seconds, 'converged': scene.converged,
-        'objects': _rows(scene, scores, palette), 'missed': _missed(scene, scores, palette),
+        'objects': rows, 'missed': _missed(scene, scores, palette),
         'true': None if scene.truth is None else len(scene.truth), 'found': found,
         'localized': sum(s.localized for s in scores) if scores else 0,
         'tight': sum(bool(s.tight) for s in scores) if scores else 0,
         'false': len({o.category for o in scene.objects}
                      - {t.category for t in scene.truth}) if scene.truth is not None else None,
         'rejected': _rejected(scene, palette), 'candidates': len(scene.pool),
+        'space': Markup(space_json(scene, drawn, meshes, true, rows, palette, store)),
         'shaded': _shaded(drawn, meshes, true, true_meshes, scene, palette)}
 
 

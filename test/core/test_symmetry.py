@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Symmetry groups and the rotation error over them."""
 
-from hooc_perception.evaluation.symmetry import is_ball, rotation_error, symmetry_rotations
+from hooc_perception.core.symmetry import is_ball, rotation_error, symmetry_rotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -1,0 +1,90 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Kinds of cases for the fuzzer: MODEL folders whose checksums are right and contents wrong."""
+
+from dataclasses import replace
+import functools
+from pathlib import Path
+import shutil
+
+from hooc_perception.benchmark.fuzz_bags import small_scene
+from hooc_perception.benchmark.mutate import odd_array
+from hooc_perception.core.classify import classify
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.observe import observe
+from hooc_perception.core.parse import parse
+from hooc_perception.core.profiles import profile, with_overrides
+from hooc_perception.core.propose import propose
+from hooc_perception.core.types import Candidates, PixelProbabilities, RectifiedView
+from hooc_perception.errors import HoocError
+from hooc_perception.models.catalogue import CATALOGUE
+from hooc_perception.models.derive import derive
+from hooc_perception.models.folder import load_model_folder, save_model_folder
+import numpy as np
+
+# Of the source tree; an installed package has none, and these cases less to look at.
+BUNDLED = Path(__file__).resolve().parents[2] / 'models' / 'demo'
+_FIELDS = ('vertices', 'faces', 'extents', 'surface_points', 'surface_normals',
+           'interior_points', 'rest_rotations', 'rest_probability', 'symmetry')
+# As little work as there can be.
+_CHEAP = {'propose.samples': 100, 'propose.pool': 5, 'propose.refine_steps': 5,
+          'propose.polish': 2, 'propose.polish_steps': 2, 'propose.per_category': 2,
+          'propose.round_samples': 100, 'propose.round_pool': 5, 'parse.rounds': 1,
+          'parse.polish_steps': 3, 'parse.patience': 1}
+
+
+@functools.lru_cache
+def _good():
+    """Return (classifier, models, Observation, PixelProbabilities) of a small made-up scene."""
+    scene, _ = small_scene()
+    K = np.array([[150.0, 0, 79.5], [0, 150, 59.5], [0, 0, 1]])
+    camera = replace(scene.cameras[0], width=160, height=120, K=K)
+    depth = np.ones((120, 160), np.float32)
+    depth[50:70, 60:100] = 0.92
+    observation = observe([RectifiedView(camera, depth)])
+    models = tuple(derive(name, CATALOGUE[name](), stage_rng(0, 'fuzz/model', i))
+                   for i, name in enumerate(list(CATALOGUE)[:2]))
+    rows, columns = np.nonzero(observation.views[0].foreground)
+    p = np.full((len(rows), 3), 85, np.uint8)
+    probabilities = PixelProbabilities(np.zeros(len(rows), np.uint8),
+                                       np.stack([columns, rows], -1).astype(np.uint16), p)
+    classifier = dict(load_model_folder(BUNDLED).classifier) if BUNDLED.is_dir() else {}
+    return classifier, models, observation, probabilities
+
+
+def _saved(folder, models, classifier):
+    """Return what is read back of a MODEL folder with these contents."""
+    shutil.rmtree(folder / 'model', ignore_errors=True)
+    try:
+        return save_model_folder(folder / 'model', 'fuzz', models, classifier, 'fast', 0, ())
+    except (ValueError, IndexError, TypeError) as error:
+        raise HoocError('not even written') from error
+
+
+def _classifier_case(rng, folder):
+    """Spoil one array of a classifier and classify with it."""
+    classifier, models, observation, _ = _good()
+    names = sorted(name for name in classifier if classifier[name].dtype.kind != 'U')
+    name = names[rng.integers(len(names))]
+    spoilt = {**classifier, name: odd_array(classifier[name], rng)}
+    classify(observation, _saved(folder, models, spoilt).classifier)
+
+
+def _model_case(rng, folder):
+    """Spoil one array of a generic model, propose and parse with it."""
+    _, models, observation, probabilities = _good()
+    name = _FIELDS[rng.integers(len(_FIELDS))]
+    bad = replace(models[0], **{name: odd_array(getattr(models[0], name), rng)})
+    models = _saved(folder, (bad, *models[1:]), {}).models
+    chosen = with_overrides(profile('fast'), _CHEAP)
+    pool = propose(observation, probabilities, models, chosen.propose, stage_rng(0, 'fuzz/a'))
+    parse(observation, probabilities, pool, models, chosen.parse, stage_rng(0, 'fuzz/b'), 0,
+          lambda objects, turn: Candidates.empty())
+
+
+def model_cases():
+    """Return {kind: function(rng, folder)}."""
+    cases = {'generic models': _model_case}
+    if _good()[0]:
+        cases['classifiers'] = _classifier_case
+    return cases

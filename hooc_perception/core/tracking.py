@@ -1,0 +1,110 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which object of this frame set is which of the last ones: lasting ids, steady orientations."""
+
+from dataclasses import dataclass
+
+from hooc_perception.core.config import Config, param
+from hooc_perception.core.symmetry import canonical_objects, rotation_error
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.transform import Rotation
+
+# A turn by a radian counts as much as a way of this share of the longest side: it tells two
+# neighbours of one category apart, but a wrong orientation alone makes no new object.
+TURN_WEIGHT = 0.1
+
+
+@dataclass(frozen=True)
+class TrackConfig(Config):
+    """Parameters of the tracker."""
+
+    track_ttl_s: float = param(30.0, 'An object that is not found for longer than this is '
+                               'forgotten, and a new one if it comes back; 0: every answer '
+                               'stands for itself, with new ids.', 's', 0.0, 3600.0, runtime=True)
+    track_reach_m: float = param(0.15, 'An object that is found farther than this from where it '
+                                 'was is a new one.', 'm', 0.001, 10.0, runtime=True)
+
+
+@dataclass
+class _Track:
+    """An object as it was last seen."""
+
+    category: int
+    translation: np.ndarray
+    R: np.ndarray
+    stamp_ns: int
+
+
+class Tracker:
+    """
+    Give the objects of successive answers lasting ids and steady orientations.
+
+    Objects of one category are matched so that all of them together move and turn least; turns
+    that a symmetric model cannot tell apart count nothing. A category that changes is another
+    object.
+
+    :param models: tuple of GenericModel; class id c is models[c - 1].
+    """
+
+    def __init__(self, models, config=TrackConfig()):
+        """Remember nothing yet."""
+        self.models, self.config = models, config
+        self._tracks, self._next_id, self._last_ns = {}, 1, None
+
+    def forget(self):
+        """Forget all objects; their ids do not come back."""
+        self._tracks, self._last_ns = {}, None
+
+    def update(self, stamp_ns, objects):
+        """
+        Return (ids (n,) uint32, Candidates) of the next answer.
+
+        The objects are the same but for turns that leave them as they are: what was there
+        before is oriented as it was, what is new as little turned from the world's axes as can
+        be. A stamp before the last one means that time was set back: all is forgotten.
+        """
+        if self._last_ns is not None and stamp_ns < self._last_ns:
+            self.forget()
+        self._last_ns = stamp_ns
+        self._tracks = {number: track for number, track in self._tracks.items()
+                        if stamp_ns - track.stamp_ns <= self.config.track_ttl_s * 1e9}
+        objects = canonical_objects(objects, self.models)
+        ids = np.zeros(len(objects), np.uint32)
+        references = [None] * len(objects)
+        if self.config.track_ttl_s > 0:
+            for row, number in self._matches(objects):
+                ids[row], references[row] = number, self._tracks[number].R
+            objects = canonical_objects(objects, self.models, references)
+        for row in np.flatnonzero(ids == 0):
+            ids[row] = self._next_id
+            self._next_id += 1
+        for row, number in enumerate(ids):
+            self._tracks[int(number)] = _Track(
+                int(objects.category[row]), objects.translation[row],
+                Rotation.from_quat(objects.rotation_xyzw[row]).as_matrix(), stamp_ns)
+        return ids, objects
+
+    def _matches(self, objects):
+        """Yield (row, id) of the objects that were there before."""
+        rotations = [Rotation.from_quat(q).as_matrix() for q in objects.rotation_xyzw]
+        for category in np.unique(objects.category):
+            rows = np.flatnonzero(objects.category == category)
+            known = [n for n, track in self._tracks.items() if track.category == category]
+            if not known:
+                continue
+            model = self.models[int(category) - 1]
+            cost = np.zeros((len(rows), len(known)))
+            far = np.zeros(cost.shape, bool)
+            for i, row in enumerate(rows):
+                for j, number in enumerate(known):
+                    track = self._tracks[number]
+                    way = np.linalg.norm(objects.translation[row] - track.translation)
+                    far[i, j] = way > self.config.track_reach_m
+                    cost[i, j] = way + TURN_WEIGHT * model.longest_side * rotation_error(
+                        rotations[row], track.R, model.symmetry)
+            # A match that may not be costs more than all that may together.
+            cost[far] = 1 + cost[~far].sum()
+            for i, j in zip(*linear_sum_assignment(cost)):
+                if not far[i, j]:
+                    yield rows[i], known[j]

@@ -1,0 +1,142 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The data of the 3D view: measured points, posed models, what nothing explains."""
+
+import base64
+import json
+
+from hooc_perception.core.geometry import back_project
+from hooc_perception.core.render import render_depth
+from hooc_perception.evaluation.errors import affine
+from hooc_perception.evaluation.report import pictures
+import numpy as np
+
+# As core.unexplained: a pixel within this distance of the composed objects is explained.
+EXPLAINED_M = 0.02
+MAX_FOREGROUND, MAX_TABLE = 24000, 12000
+BORDER_M = 0.12
+TABLE_RGB, UNEXPLAINED_RGB = (150, 154, 160), (255, 60, 60)
+
+
+class Meshes:
+    """The generic meshes that a page shows, each once however often it stands somewhere."""
+
+    def __init__(self):
+        """Know no mesh yet."""
+        self._known = {}
+
+    def use(self, model):
+        """Return the name under which the page knows a GenericModel's mesh."""
+        if model.name not in self._known:
+            unit = model.vertices / np.maximum(model.extents, 1e-9) + 0.5
+            wide = len(unit) > 65535
+            self._known[model.name] = {
+                'v': packed(np.round(65535 * unit.clip(0, 1)), np.uint16),
+                'f': packed(model.faces, np.uint32 if wide else np.uint16), 'wide': wide,
+                'extents': [float(x) for x in model.extents]}
+        return model.name
+
+    def json(self):
+        """Return the text of all meshes, fit to stand inside of a script element."""
+        return script_json(self._known)
+
+
+def packed(values, kind):
+    """Return an array as base64 of little-endian numbers of a kind."""
+    return base64.b64encode(np.ascontiguousarray(
+        values, np.dtype(kind).newbyteorder('<')).tobytes()).decode()
+
+
+def script_json(content):
+    """Return JSON that no script element mistakes for its end."""
+    return json.dumps(content, allow_nan=False).replace('<', '\\u003c')
+
+
+def space_json(scene, drawn, meshes, true, rows, palette, store):
+    """
+    Return the text of one scene's 3D view.
+
+    :param scene: ReportScene.
+    :param drawn: the PosedObjects that have a model, `meshes` as they stand, see `world_mesh`.
+    :param true: true PosedObjects that have a model.
+    :param rows: rows of the objects' table, for what is said of an object when it is picked.
+    :param store: Meshes of the page.
+    """
+    colours = pictures.instance_colours(drawn, palette)
+    facts = {row['k']: facts_of(row) for row in rows}
+    objects = [{'name': o.category, 'colour': [int(c) for c in colours[k]],
+                'facts': facts.get(k, [])} | placed(o, scene.models[o.category], store)
+               for k, o in enumerate(drawn)]
+    truth = [{'name': o.category} | placed(o, scene.models[o.category], store) for o in true]
+    cloud, target = cloud_of(scene.observation, meshes, colours)
+    eye = scene.observation.views[0].camera.T_world_camera[:3, 3] - target
+    return script_json({'objects': objects, 'truth': truth, 'cloud': cloud,
+                        'target': [float(x) for x in target],
+                        'azimuth': float(np.arctan2(eye[1], eye[0]))})
+
+
+def placed(thing, model, store):
+    """Return the mesh of a PosedObject and where it stands: the columns of A, then t, metres."""
+    A, t = affine(thing, model)
+    return {'mesh': store.use(model), 'at': [float(x) for x in (*A.T.ravel(), *t)]}
+
+
+def cloud_of(observation, meshes, colours):
+    """
+    Return (dict of the points near the objects, (3,) middle of what stands there).
+
+    The points come in three groups: table, explained (in the colour of their object),
+    unexplained.
+    """
+    groups = [[], [], []]
+    for view in observation.views:
+        points = back_project(view.depth, view.camera)
+        depth, ids = render_depth(meshes, view.camera)
+        with np.errstate(invalid='ignore'):
+            explained = view.foreground & (np.abs(depth - view.depth) <= EXPLAINED_M)
+        shade = 0.55 + 0.45 * pictures.hillshade(view.depth, view.camera)
+        for k, mask in enumerate((view.table & ~view.foreground & np.isfinite(view.depth),
+                                  explained, view.foreground & ~explained)):
+            rgb = np.full((mask.sum(), 3), TABLE_RGB, float)
+            if k == 1:
+                rgb = np.array([*colours, (0, 0, 0)], float)[ids[mask]]
+            elif k == 2:
+                rgb[:] = UNEXPLAINED_RGB
+            groups[k].append((points[mask], rgb * shade[mask][:, None]))
+    table, explained, left = (tuple(np.concatenate(part) for part in zip(*group))
+                              for group in groups)
+    standing = np.concatenate([explained[0], left[0], *(v for v, _ in meshes)])
+    standing = standing[np.isfinite(standing).all(1)]
+    if not len(standing):
+        standing = np.array([[-0.3, -0.3, 0], [0.3, 0.3, 0.2]])
+    low, high = np.percentile(standing, [1, 99], axis=0) + np.array([[-BORDER_M], [BORDER_M]])
+    foreground = len(explained[0]) + len(left[0])
+    kept = []
+    for k, (points, rgb) in enumerate((table, explained, left)):
+        inside = np.flatnonzero(((points >= low) & (points <= high)).all(1))
+        most = MAX_TABLE if k == 0 else max(1, MAX_FOREGROUND * len(points) // max(foreground, 1))
+        inside = inside[:: -(-len(inside) // most) or 1]
+        kept.append((points[inside], rgb[inside]))
+    points, rgb = (np.concatenate(part) for part in zip(*kept))
+    return {'n': [len(p) for p, _ in kept], 'low': low.tolist(), 'span': (high - low).tolist(),
+            'p': packed(np.round(65535 * (points - low) / (high - low)), np.uint16),
+            'rgb': packed(rgb.clip(0, 255), np.uint8)}, (low + high) / 2
+
+
+def facts_of(row):
+    """Return [(label, text)] of a row of the objects' table."""
+    def number(value, digits, unit):
+        return None if value is None else f'{value:.{digits}f}{unit}'
+
+    def triple(values):
+        return ' '.join(f'{v:.1f}' for v in values) + ' cm'
+
+    ratio, residual = row['visible_ratio'], row['residual_m']
+    facts = [('score', number(row['score'], 2, '')), ('position', triple(row['at'])),
+             ('size', triple(row['size'])),
+             ('in sight', number(None if ratio is None else 100 * ratio, 0, ' %')),
+             ('residual', number(None if residual is None else 1000 * residual, 1, ' mm')),
+             ('views', number(row['n_views'], 0, '')),
+             ('error', number(row['error_mm'], 0, ' mm')),
+             ('turned', number(row['turn'], 0, '°'))]
+    return [list(fact) for fact in facts if fact[1] is not None]

@@ -1,0 +1,55 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`make results`: compute what is out of date, then write the tables into the pages."""
+
+import argparse
+from pathlib import Path
+import sys
+
+from hooc_perception.errors import HoocError
+from hooc_perception.experiments import fingerprint, page, plan
+from hooc_perception.experiments.run import run
+
+DOCS = fingerprint.PACKAGE.parent / 'docs'
+
+
+def main(argv=None):
+    """Run the command; return the exit code."""
+    parser = argparse.ArgumentParser(prog='python -m hooc_perception.experiments',
+                                     description=__doc__)
+    parser.add_argument('--out', type=Path, default=Path('results'),
+                        help='folder of everything computed (default: results)')
+    parser.add_argument('--set', action='append', default=[], metavar='NAME[=FOLDER]',
+                        help='a set to run; twin needs no folder (default: twin)')
+    parser.add_argument('--rows', nargs='+', default=list(plan.ROWS), metavar='ROW',
+                        help=f'only these of {", ".join(plan.ROWS)}')
+    parser.add_argument('--keep', nargs='+', default=[], metavar='ROW',
+                        help='rows that stay though their code has changed')
+    parser.add_argument('--force', nargs='+', default=[], metavar='ROW',
+                        help='rows that run in any case')
+    parser.add_argument('--seed', type=int, default=0)
+    parser.add_argument('--jobs', type=int, default=0, help='workers of training, 0 = all cores')
+    parser.add_argument('--docs', type=Path, default=DOCS,
+                        help='folder whose pages take the tables')
+    parser.add_argument('--dry-run', action='store_true', help='only say what would run and why')
+    args = parser.parse_args(argv)
+    try:
+        sets = dict(s.partition('=')[::2] for s in args.set or ['twin'])
+        sets = {name: folder or None for name, folder in sets.items()}
+        steps = plan.steps_of(sets, args.out, args.rows, args.seed, args.jobs)
+        records = run(steps, args.out, args.keep, args.force, args.dry_run)
+        if not args.dry_run:
+            for path in page.write_pages(sorted(args.docs.glob('results*.md')),
+                                         args.docs / 'images', args.out, sets, records):
+                print(path)
+    except HoocError as e:
+        print(f'results: {e}', file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print('results: interrupted; run it again to resume', file=sys.stderr)
+        return 130
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,22 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Import message packages that only ROS installations have."""
+
+import importlib
+
+from hooc_perception.errors import HoocError
+
+
+def messages_of(package, parameter):
+    """
+    Return the module `package`.msg.
+
+    :param parameter: the parameter that asks for it, for the complaint.
+    :raises HoocError: where it is not installed.
+    """
+    try:
+        return importlib.import_module(f'{package}.msg')
+    except ImportError as error:
+        raise HoocError(f'parameter {parameter} needs the package {package}, which is not '
+                        f'installed ({error}); install ros-jazzy-{package.replace("_", "-")} '
+                        f'or leave {parameter} at its default') from error

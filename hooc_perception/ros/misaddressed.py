@@ -1,0 +1,61 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Parameters that a file or a command line sets and nobody takes: typing errors, mostly."""
+
+from dataclasses import fields
+import difflib
+import importlib
+
+# The nodes whose parameters may stand in a section for all.
+NODES = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node', 'replay_node')
+_OF_ROS = ('use_sim_time', 'start_type_description_service')
+
+
+def misaddressed(given, declared):
+    """
+    Return one sentence for each parameter that was given and is not known to any node.
+
+    What another node knows may come from a section for all nodes and is passed over.
+
+    :param given: names that files and the command line set for a node.
+    :param declared: names that the node has declared.
+    """
+    unknown = sorted(set(given) - set(declared) - set(_OF_ROS))
+    if not unknown:
+        return []
+    elsewhere = known_elsewhere() | set(declared)
+    return [_sentence(name, elsewhere, declared) for name in unknown if name not in elsewhere]
+
+
+def known_elsewhere():
+    """Return the names of all parameters of all nodes, extrinsics and QoS aside."""
+    from hooc_perception.core.profiles import profile
+    names = set()
+    for node in NODES:
+        # By name, for this layer lies below the nodes; and only where something is wrong.
+        module = importlib.import_module(f'hooc_perception.nodes.{node}')
+        for config in vars(module).values():
+            if isinstance(config, type) and config.__name__.endswith('Config'):
+                names |= {f.name for f in fields(config)}
+    chosen = profile('best')
+    for stage in ('observe', 'classify', 'propose', 'parse'):
+        names |= {f'{stage}.{f.name}' for f in fields(getattr(chosen, stage))}
+    return names
+
+
+def _sentence(name, known, declared):
+    """Return what is wrong with a name, and what it could have been."""
+    kind, _, rest = name.partition('.')
+    if kind == 'extrinsics':
+        cameras = sorted(n.partition('.')[2] for n in declared if n.startswith('extrinsics.'))
+        return (f'parameter {name} is for a camera that is not used; the cameras are '
+                f'{", ".join(cameras) or "unknown here: set it for the ingestion_node"}')
+    if kind == 'qos_overrides':
+        topics = sorted({n.split('.')[1] for n in declared if n.startswith('qos_overrides.')})
+        near = difflib.get_close_matches(rest.split('.')[0], topics, 1, 0.5)
+        return (f'parameter {name} overrides the QoS of nothing here; it is qos_overrides.<topic '
+                'with namespace>.<publisher or subscription>.<history, depth, durability or '
+                'reliability>' + (f', such as for {near[0]}' if near else ''))
+    near = difflib.get_close_matches(name, known, 1, 0.6)
+    return (f'parameter {name} is unknown and has no effect'
+            + (f'; is {near[0]} meant?' if near else '; see docs/nodes.md'))

@@ -1,0 +1,40 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Shared memory that killed processes could not give back."""
+
+from contextlib import suppress
+import fcntl
+import os
+from pathlib import Path
+import re
+
+FOLDER = Path('/dev/shm')
+# A segment of Fast DDS and the file that its owner keeps locked for as long as it lives.
+_LOCK_FILE = re.compile(r'fastrtps_[0-9a-f]{16}_el')
+
+
+def free_orphans(folder=FOLDER):
+    """
+    Remove the Fast DDS segments of this user whose owners have died; return their bytes.
+
+    Fast DDS leaves them behind where a process is killed: 64 MB each with our profile, so that
+    a node that dies again and again would fill the memory of the machine. Whoever still has
+    one mapped keeps what it has.
+
+    :param folder: where shared memory is mounted.
+    """
+    freed = 0
+    for lock in Path(folder).glob('fastrtps_*_el'):
+        if not _LOCK_FILE.fullmatch(lock.name):
+            continue
+        with suppress(OSError):
+            if lock.stat().st_uid != os.getuid():
+                continue
+            with open(lock, 'rb') as file:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)    # fails while it lives
+                segment = lock.with_name(lock.name.removesuffix('_el'))
+                with suppress(FileNotFoundError):
+                    freed += segment.stat().st_size
+                    segment.unlink()
+                lock.unlink()
+    return freed

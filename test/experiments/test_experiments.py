@@ -1,0 +1,277 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Which steps run again and which do not, and what the pages show."""
+
+import json
+from pathlib import Path
+
+from hooc_perception.cli.main import main as hooc
+from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import Camera
+from hooc_perception.errors import HoocError
+from hooc_perception.experiments import fingerprint, page, plan, run
+from hooc_perception.experiments.__main__ import main
+from hooc_perception.scenes.scene_set import NewScene, TrueObject, write_scene_set
+import numpy as np
+import pytest
+import trimesh
+
+MESHES = {'box': trimesh.creation.box((0.16, 0.10, 0.06)),
+          'can': trimesh.creation.cylinder(0.03, 0.12, sections=24)}
+TRUTH = (TrueObject('box', np.array([0.1, 0.0, 0.03]), np.array([0, 0, 0, 1.0]),
+                    np.array([0.16, 0.10, 0.06])),
+         TrueObject('can', np.array([-0.1, 0.0, 0.06]), np.array([0, 0, 0, 1.0]),
+                    np.array([0.06, 0.06, 0.12])))
+
+
+@pytest.fixture(scope='module')
+def scene_set(tmp_path_factory):
+    """Return the folder of a set with one scene, seen from above."""
+    T = np.diag([1.0, -1.0, -1.0, 1.0])
+    T[2, 3] = 0.9
+    K = np.array([[150.0, 0, 79.5], [0, 150.0, 59.5], [0, 0, 1]])
+    camera = Camera('top', 160, 120, K, np.zeros(5), T)
+    ground = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
+    meshes = [(MESHES[t.category].vertices + t.translation,
+               np.asarray(MESHES[t.category].faces, np.int32)) for t in TRUTH]
+    meshes.append((ground, np.array([[0, 1, 2], [0, 2, 3]], np.int32)))
+    depth = render_depth(meshes, camera)[0]
+    depth = np.where(np.isfinite(depth), depth, np.nan)
+    folder = tmp_path_factory.mktemp('sets') / 'small'
+    return write_scene_set(folder, 'small', MESHES, (camera,),
+                           [NewScene('one', (depth,), TRUTH)], 1)
+
+
+@pytest.fixture
+def ran(monkeypatch):
+    """Put in place of the commands what writes their arguments; return the names that ran."""
+    names = []
+
+    def execute(step, root):
+        names.append(step.name)
+        step.output.parent.mkdir(parents=True, exist_ok=True)
+        if step.kind in ('twin', 'train', 'plots'):
+            step.output.mkdir(exist_ok=True)
+            (step.output / 'file').write_text(step.name)
+        else:
+            step.output.write_text(step.name)
+        return run.Record(run.key_of(step), fingerprint.of_code(plan.CODE[step.kind]), 'abc',
+                          1.0, 2.0, 3.0)
+
+    monkeypatch.setattr(run, 'execute', execute)
+    return names
+
+
+def quiet(*arguments, **options):
+    """Run steps without a word."""
+    return run.run(*arguments, **options, say=lambda text: None)
+
+
+def test_the_plan_runs_in_its_order(tmp_path, scene_set):
+    steps = plan.steps_of({'twin': None, 'small': scene_set}, tmp_path)
+    made = {scene_set}
+    for step in steps:
+        assert set(step.inputs) <= made, step.name
+        made.add(step.output)
+    names = [step.name for step in steps]
+    assert len(set(names)) == len(names)
+    # Two rows of baselines with two steps, three profiles with four, pictures, and the twin.
+    assert len(names) == 2 * (2 * 2 + 3 * 4 + 1) + 1
+
+
+@pytest.mark.parametrize('sets, rows, word', [
+    ({'elsewhere': None}, ('best',), 'elsewhere'), ({'twin': None}, ('good',), 'good')])
+def test_unknown_sets_and_rows_are_named(tmp_path, sets, rows, word):
+    with pytest.raises(HoocError, match=word):
+        plan.steps_of(sets, tmp_path, rows)
+
+
+def test_every_command_of_the_plan_exists(tmp_path, scene_set):
+    import argparse
+    import importlib
+    for step in plan.steps_of({'twin': None, 'small': scene_set}, tmp_path):
+        command, *arguments = map(str, step.arguments)
+        parser = argparse.ArgumentParser(exit_on_error=False)
+        importlib.import_module(f'hooc_perception.cli.{command}').add_arguments(parser)
+        parser.parse_args(arguments)
+
+
+def test_what_is_done_is_not_done_again(tmp_path, ran):
+    steps = plan.steps_of({'twin': None}, tmp_path, ('best', 'ppf'))
+    quiet(steps, tmp_path)
+    assert ran == [step.name for step in steps]
+    ran.clear()
+    quiet(steps, tmp_path)
+    assert ran == []
+
+
+def test_a_lost_file_is_made_again_and_only_what_depends_on_it(tmp_path, ran):
+    steps = plan.steps_of({'twin': None}, tmp_path, ('best', 'ppf'))
+    quiet(steps, tmp_path)
+    ran.clear()
+    layout = plan.Layout(tmp_path, 'twin')
+    layout.results('best', 'A').unlink()
+    quiet(steps, tmp_path)
+    # It came out as before, so what reads it has nothing new.
+    assert ran == ['twin/best/A']
+    ran.clear()
+    (layout.model('best') / 'file').write_text('another model')
+    quiet(steps, tmp_path)
+    assert ran == ['twin/best/A', 'twin/best/B', 'twin/best/scores']
+
+
+def test_changed_code_runs_its_rows_again_but_for_those_that_are_kept(tmp_path, ran,
+                                                                      monkeypatch):
+    steps = plan.steps_of({'twin': None}, tmp_path, ('best', 'ppf'))
+    quiet(steps, tmp_path)
+    ran.clear()
+    plain = fingerprint.of_code
+    monkeypatch.setattr(fingerprint, 'of_code', lambda roots: plain(roots) + (
+        'new' if 'hooc_perception.core.pipeline' in roots or 'evaluation.baselines' in roots[0]
+        else ''))
+    quiet(steps, tmp_path, keep=('ppf',))
+    assert ran == ['twin/best/A', 'twin/best/B']
+    ran.clear()
+    quiet(steps, tmp_path)
+    assert ran == ['twin/ppf/A']
+
+
+def test_force_runs_a_row_and_a_dry_run_nothing(tmp_path, ran):
+    steps = plan.steps_of({'twin': None}, tmp_path, ('fast', 'ppf'))
+    quiet(steps, tmp_path, dry=True)
+    assert ran == [] and not (tmp_path / run.RECORDS).exists()
+    quiet(steps, tmp_path)
+    ran.clear()
+    quiet(steps, tmp_path, force=('ppf',))
+    assert ran == ['twin/ppf/A', 'twin/ppf/scores']
+
+
+def test_the_number_of_workers_and_the_place_do_not_matter(tmp_path, ran):
+    quiet(plan.steps_of({'twin': None}, tmp_path / 'a', ('best',), jobs=1), tmp_path / 'a')
+    ran.clear()
+    (tmp_path / 'a').rename(tmp_path / 'b')
+    quiet(plan.steps_of({'twin': None}, tmp_path / 'b', ('best',), jobs=2), tmp_path / 'b')
+    assert ran == []
+    quiet(plan.steps_of({'twin': None}, tmp_path / 'b', ('best',), seed=1), tmp_path / 'b')
+    assert 'twin/best/train' in ran
+
+
+def test_a_failing_step_names_its_log_and_leaves_no_record(tmp_path):
+    step = plan.Step('x/best/A', 'best', 'parse', ('parse', 'no-such-set', '--model', 'm',
+                                                   '--out', 'o'), (), tmp_path / 'out.json')
+    with pytest.raises(HoocError, match='x_best_A.log'):
+        quiet([step], tmp_path)
+    assert 'no-such-set' in (tmp_path / 'logs' / 'x_best_A.log').read_text()
+    assert run.load_records(tmp_path) == {}
+
+
+def test_damaged_records_are_named(tmp_path):
+    (tmp_path / run.RECORDS).write_text('{"a": 3}')
+    with pytest.raises(HoocError, match=run.RECORDS):
+        run.load_records(tmp_path)
+
+
+def test_training_does_not_hang_on_the_code_of_parsing():
+    trained = fingerprint.modules_of(plan.CODE['train'])
+    assert {'hooc_perception.training.fit_pixels', 'hooc_perception.core.kernels.forest_pixels',
+            'hooc_perception.synthesis.settle'} <= set(trained)
+    assert 'hooc_perception.core.parse' not in trained
+    parsed = fingerprint.modules_of(plan.CODE['parse'])
+    assert 'hooc_perception.core.parse' in parsed
+    assert not any(name.startswith('hooc_perception.training') for name in parsed)
+
+
+def test_comments_do_not_count_as_code_but_numbers_do(tmp_path):
+    digests = []
+    for k, text in enumerate(['"""Say."""\nX = 1\n', '"""Tell."""\n# Why.\nX = 1\n', 'X = 2\n']):
+        path = tmp_path / f'{k}.py'
+        path.write_text(text)
+        digests.append(fingerprint._parsed(path)[0])
+    assert digests[0] == digests[1] != digests[2]
+
+
+def truth_entries(shift=0.0):
+    """Return the truth as the objects of a results file, moved along x."""
+    return [{'category': t.category, 'score': 1.0, 'size': t.size.tolist(),
+             'translation': (t.translation + [shift, 0, 0]).tolist(),
+             'rotation_xyzw': t.rotation_xyzw.tolist()} for t in TRUTH]
+
+
+@pytest.fixture
+def computed(tmp_path, scene_set):
+    """Return a folder with real scores: the truth as the answer of best, spoilt as ppf's."""
+    layout = plan.Layout(tmp_path / 'results', 'small')
+    for row, shift, settings in (('best', 0.0, 'AB'), ('ppf', 0.07, 'A')):
+        files = []
+        for setting in settings:
+            files.append(layout.results(row, setting))
+            files[-1].parent.mkdir(parents=True, exist_ok=True)
+            files[-1].write_text(json.dumps({
+                'format': 'hooc-results/1', 'dataset': 'small', 'setting': setting,
+                'scenes': [{'scene': 'one', 'seconds': 2.0, 'energy': None,
+                            'objects': truth_entries(shift)}]}))
+        assert hooc(['evaluate', str(scene_set), *map(str, files), '--bop', '--json',
+                     str(layout.scores(row)), '--plots', str(layout.plots)]) == 0
+    return tmp_path / 'results'
+
+
+def cells(text, start):
+    """Return the stripped cells of the Markdown rows that start with `start`."""
+    return [[c.strip(' *`') for c in line.split('|')[1:-1]] for line in text.splitlines()
+            if line.replace('*', '').startswith(f'| {start} |')]
+
+
+def test_the_truth_scores_one_in_every_column_and_a_spoilt_one_does_not(computed):
+    records = {'small/best/A': run.Record('k', 'c', 'abc', 7.0, 9.0, 10.0)}
+    sections = page.sections_of(computed, ['small', 'absent'], records)
+    assert set(sections) == {'small', 'small details', 'steps'}
+    perfect = ['1.000'] * 4 + ['0.0', '0', '0'] + ['1.00'] * 4
+    (a, b), (spoilt,) = cells(sections['small'], '`best`'), cells(sections['small'], '`ppf`')
+    assert a == ['best', 'A', *perfect, '7'] and b == ['best', 'B', *perfect, '-']
+    # Seven centimetres off: near enough for the box of 16 cm, not for the can of 12.
+    assert spoilt[2:5] == ['1.000', '0.500', '0.000']
+    assert float(spoilt[12]) < 0.3
+    hooc_a, hooc_b = cells(sections['small'], 'the paper, on HOOC')
+    assert hooc_a[2:4] == ['0.441', '0.292'] and hooc_b[2:4] == ['0.624', '0.566']
+    assert cells(sections['small'], 'can')[0][1:] == ['1', '1', '0']
+    assert cells(sections['small details'], 'sellotape core')[0][-1] == '0.71'
+    assert cells(sections['steps'], 'all')[0][1] == '7'
+
+
+def test_pages_take_tables_between_their_markers(computed, tmp_path):
+    docs = tmp_path / 'docs'
+    (docs / 'images').mkdir(parents=True)
+    text = ('before\n<!-- results: small -->\nold\n<!-- end of results -->\nbetween\n'
+            '<!-- results: other -->\nkept\n<!-- end of results -->\nafter\n')
+    pages = [docs / 'results.md', docs / 'results_more.md']
+    pages[0].write_text(text)
+    pages[1].write_text('nothing to fill\n')
+    written = page.write_pages(pages, docs / 'images', computed, ['small'], {})
+    new = pages[0].read_text()
+    assert 'old' not in new and 'kept' in new and '### Found and localized' in new
+    assert new.startswith('before\n') and new.endswith('after\n') and '\nbetween\n' in new
+    assert {path.name for path in written} == {'results.md', 'results_small_errors.png',
+                                               'results_small_categories.png'}
+    page.write_pages(pages, docs / 'images', computed, ['small'], {})
+    assert pages[0].read_text() == new
+
+
+def test_a_marker_without_an_end_is_named():
+    with pytest.raises(HoocError, match='a.md'):
+        page.inserted('<!-- results: small -->\n', {}, 'a.md')
+
+
+def test_the_pages_of_the_documentation_have_the_markers():
+    docs = Path(fingerprint.PACKAGE).parent / 'docs'
+    names = set()
+    for path in docs.glob('results*.md'):
+        names |= page.inserted(path.read_text(), {}, str(path))[1]
+    assert names >= {'twin', 'twin details', 'dev', 'dev details', 'osd', 'osd details', 'steps'}
+
+
+def test_the_command_says_what_is_wrong(tmp_path, capsys):
+    assert main(['--out', str(tmp_path), '--rows', 'good', '--dry-run']) == 1
+    assert 'good' in capsys.readouterr().err
+    assert main(['--out', str(tmp_path), '--dry-run']) == 0
+    out = capsys.readouterr().out
+    assert 'twin/set: not done yet' in out and 'twin/ppf/scores: follows another' in out

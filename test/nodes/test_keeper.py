@@ -1,0 +1,134 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Real processes that are killed in the middle of a scene, and come back by themselves."""
+
+import fcntl
+import os
+import signal
+import time
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.ros.qos import qos  # noqa: E402
+from hooc_perception.supervisor import environment  # noqa: E402
+from hooc_perception.supervisor.keeper import Keeper  # noqa: E402
+from hooc_perception.supervisor.shared_memory import free_orphans  # noqa: E402
+from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor  # noqa: E402
+
+# As little work as the stages can be told to do: what is tested is who does it.
+CHEAP = {
+    'candidate_node': {'propose.samples': 300, 'propose.pool': 10, 'propose.refine_steps': 5,
+                       'propose.polish': 2, 'propose.polish_steps': 2,
+                       'propose.per_category': 2},
+    'parsing_node': {'parse.rounds': 0, 'parse.polish_steps': 0, 'parse.patience': 0,
+                     'parse.finalists': 1}}
+
+
+@pytest.fixture
+def own_environment(monkeypatch):
+    """Keep what the supervisor puts into the environment from leaking into other tests."""
+    for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE',
+                 environment.TRANSPORTS_VARIABLE, *environment.FAST_DDS_VARIABLES):
+        monkeypatch.setenv(name, '')
+        monkeypatch.delenv(name)
+
+
+def cheap_chain(root):
+    """Return the parameters of a chain that answers within a second or two."""
+    common = {'model': str(root / 'models' / 'demo'), 'profile': 'fast', 'warm_up': False}
+    parameters = {name: {**common, **CHEAP.get(name, {})} for name in CHAIN}
+    parameters[REPLAY] = {'bag': str(root / 'bags' / 'demo'), 'loop': True, 'rate': 0.0,
+                          'answer_timeout_s': 2.0}
+    return parameters
+
+
+def statuses(node):
+    """Return a dict that fills with the latest DiagnosticStatus of each name."""
+    from diagnostic_msgs.msg import DiagnosticArray
+    latest = {}
+    node.create_subscription(DiagnosticArray, '/diagnostics', lambda message: latest.update(
+        {status.name: status for status in message.status}), 50)
+    return latest
+
+
+def test_each_node_that_is_killed_comes_back(repository, own_environment):
+    with Supervisor((*CHAIN, REPLAY), cheap_chain(repository), isolated=True) as supervisor:
+        supervisor.bring_up()
+        keeper = Keeper(supervisor, pause_s=0.1)
+        heard, latest = [], statuses(supervisor.node)
+        supervisor.node.create_subscription(PoseArray, 'objects/poses', heard.append,
+                                            qos('objects/poses'))
+
+        def until(condition, timeout_s=60.0):
+            deadline = time.monotonic() + timeout_s
+            while not condition() and time.monotonic() < deadline:
+                keeper.spin(0.05)
+            return condition()
+
+        def said(name):
+            status = latest.get(f'hooc_supervisor: {name}')
+            return status and 'SIGKILL' in status.message
+
+        assert until(lambda: heard and heard[-1].poses)
+        # A change at run time outlives the process that it was made in.
+        supervisor.set_parameters('ingestion_node', {'max_set_spread_s': 0.25})
+        for name in CHAIN:
+            os.kill(supervisor.processes[name].pid, signal.SIGKILL)
+            heard.clear()
+            assert until(lambda: heard and not heard[-1].poses), 'the answer is not taken back'
+            assert until(lambda: said(name)), latest
+            assert until(lambda: not keeper.reviving() and heard[-1].poses), f'no {name}'
+        assert keeper.deaths == dict.fromkeys(CHAIN, 1)
+        assert supervisor._parameters['ingestion_node']['max_set_spread_s'] == 0.25
+        assert until(lambda: 'hooc_supervisor: parsing_node' in latest)
+
+
+def test_a_node_that_keeps_dying_is_tried_less_and_less_often(own_environment, tmp_path,
+                                                              monkeypatch):
+    monkeypatch.setenv('PYTHONPATH', str(tmp_path))
+    (tmp_path / 'stillborn.py').write_text(
+        'import sys\nprint("[ERROR] my disk is full", flush=True)\nsys.exit(3)\n')
+    with Supervisor((REPLAY,), isolated=True) as supervisor:
+        keeper = Keeper(supervisor, pause_s=0.1, longest_s=0.5)
+        supervisor._modules[REPLAY] = 'stillborn'
+        supervisor.processes[REPLAY].kill()
+        deadline = time.monotonic() + 30
+        while keeper.deaths[REPLAY] < 6 and time.monotonic() < deadline:
+            keeper.spin(0.02)
+        assert keeper.deaths[REPLAY] == 6
+        assert keeper._pause_of(REPLAY) == 0.5
+        (status,) = (s for s in keeper.diagnostics.statuses() if s.name.endswith(REPLAY))
+        assert status.level == type(status).ERROR and 'my disk is full' in status.message
+        assert 'exit code 3' in status.message
+
+
+def test_only_shared_memory_without_an_owner_is_removed(tmp_path):
+    def segment(number):
+        path = tmp_path / f'fastrtps_{number:016x}'
+        path.write_bytes(bytes(1000))
+        path.with_name(path.name + '_el').touch()
+        return path
+
+    dead, living, other = segment(1), segment(2), tmp_path / 'fastrtps_port7411_el'
+    other.touch()
+    with open(living.with_name(living.name + '_el')) as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        assert free_orphans(tmp_path) == 1000
+    assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
+        [living.name, living.name + '_el', other.name]) and not dead.exists()
+
+
+def test_fast_dds_locks_what_it_lives_in(own_environment, monkeypatch):
+    """What the clean-up relies on, with the real library."""
+    from hooc_perception.supervisor.shared_memory import FOLDER
+    if not FOLDER.is_dir():
+        pytest.skip('no shared memory')
+    before = set(FOLDER.glob('fastrtps_*_el'))
+    with Supervisor((REPLAY,), isolated=True) as supervisor:
+        made = {p for p in set(FOLDER.glob('fastrtps_*_el')) - before if 'port' not in p.name}
+        free_orphans()
+        assert made <= set(FOLDER.glob('fastrtps_*_el'))
+        supervisor.state(REPLAY)

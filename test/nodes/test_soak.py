@@ -1,0 +1,107 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Days beside a robot, in short: nothing grows, and every frame is used or counted."""
+
+import gc
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.nodes.ingestion_node import IngestionNode  # noqa: E402
+from hooc_perception.ros import conversions as c  # noqa: E402
+from hooc_perception.supervisor import environment  # noqa: E402
+import psutil  # noqa: E402
+from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
+
+spec = importlib.util.spec_from_file_location('raw_camera', Path(__file__).with_name(
+    'raw_camera.py'))
+raw_camera = importlib.util.module_from_spec(spec)
+spec.loader.exec_module(raw_camera)
+
+SETS, MS = 2000, 10 ** 6
+# As little work as the stages can be told to do.
+CHEAP = {
+    'candidate_node': {'propose.samples': 300, 'propose.pool': 10, 'propose.refine_steps': 5,
+                       'propose.polish': 2, 'propose.polish_steps': 2,
+                       'propose.per_category': 2},
+    'parsing_node': {'parse.rounds': 0, 'parse.polish_steps': 0, 'parse.patience': 0,
+                     'parse.finalists': 1}}
+
+
+def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
+    """Through the node itself, on a clock of our own: an hour at 0.5 Hz in seconds."""
+    rng, names = np.random.default_rng(0), ('a', 'b', 'c')
+    node = bench.add(IngestionNode, cameras=list(names), warm_up=False, wait_for_answer_s=0.0,
+                     camera_timeout_s=0.3, explain_after_s=0.0, fuse_frames=3,
+                     max_frame_age_s=0.0)
+    assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
+    assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+    clock, sent, memory, objects = [10 ** 18], [], [], []
+    node.now_ns = lambda: clock[0]
+    publish = node.output.publish
+    node.output.publish = lambda stamp, *rest: (sent.append(stamp), publish(stamp, *rest))
+    inputs = {camera.name: camera for camera in node.inputs}
+    images = [raw_camera.a_depth(i) for i in range(4)]
+    pose = c.transform_message([0.1, 0.2, 1.0], raw_camera.ROTATION, c.header(0, 'table'), 'x')
+    infos = {name: raw_camera.a_camera(name) for name in names}
+    away, given, looped = dict.fromkeys(names, 0), 0, 0
+    for camera in inputs.values():
+        camera._on_extrinsics(pose)
+    for i in range(SETS):
+        clock[0] += 100 * MS
+        for name in names:
+            if rng.random() < 0.01:
+                away[name] = i + int(rng.integers(5, 40))
+            if away[name] > i:
+                continue
+            # The bag begins anew every 500 sets, with the stamps that it has.
+            stamp = clock[0] - looped * 50_000 * MS
+            head = c.header(stamp + int(rng.integers(5 * MS)), f'{name}_optical')
+            inputs[name]._on_info(c.camera_info_message(infos[name], head))
+            inputs[name]._on_image(c.image_message(images[i % 4], '16UC1', head))
+            given += 1
+        node.on_timer()
+        if sent:
+            node.on_answer(PoseArray(header=c.header(sent[-1], 'table')))
+        if i % 500 == 499:
+            looped += 1
+            gc.collect()
+            memory.append(psutil.Process().memory_info().rss)
+            objects.append(len(gc.get_objects()))
+        bench.executor.spin_once(timeout_sec=0)
+    waiting = len(names) - len(node.sets.missing())
+    jumps = sum(n for (_, reason), n in node.sets.drops.items() if reason == 'time_jump')
+    accounted = node.sets.used.total() + node.sets.drops.total() + waiting
+    # A jump counts even where nothing waited.
+    assert given <= accounted <= given + jumps, (given, node.sets.used, node.sets.drops)
+    assert all(reason in ('superseded', 'spread', 'time_jump')
+               for _, reason in node.sets.drops), node.sets.drops
+    assert looped == 4 and jumps >= 3 and len(sent) > 0.85 * SETS and len(sent) == node.number
+    assert memory[-1] - memory[1] < 8e6, memory
+    assert objects[-1] - objects[1] < 2000, objects
+
+
+@pytest.mark.slow
+def test_the_chain_of_processes_does_not_grow(repository, monkeypatch, tmp_path):
+    from hooc_perception.benchmark.soak import soak, write_plot
+    from hooc_perception.supervisor.supervisor import CHAIN
+    for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE',
+                 environment.TRANSPORTS_VARIABLE, *environment.FAST_DDS_VARIABLES):
+        monkeypatch.setenv(name, '')
+        monkeypatch.delenv(name)
+    common = {'model': str(repository / 'models' / 'demo'), 'profile': 'fast'}
+    parameters = {name: {**common, **CHEAP.get(name, {})} for name in CHAIN}
+    parameters['ingestion_node']['camera_timeout_s'] = 1.0
+    result = soak(repository / 'bags' / 'demo', parameters, 40.0, rate=2.0)
+    assert result.deaths == 0 and result.answers >= 5
+    # Whatever ingestion sent on was answered.
+    assert result.answers == result.sets
+    grown = {name: result.growth_mb(name) for name in CHAIN}
+    assert max(grown.values()) < 40, grown
+    write_plot(tmp_path / 'soak.png', result)
+    assert (tmp_path / 'soak.png').stat().st_size > 5000

@@ -53,30 +53,38 @@ class Verifier:
         return self.forest.predict(x)[:, 1].astype(np.float64)
 
 
-def margins(energy):
+def margins(energy, siblings):
     """
-    Return (n,) float64: least energy with candidate k minus least energy without it, in pixels.
+    Return (n,) float64: what the thing that each candidate stands for is worth, in pixels.
 
-    One exchange with another candidate is allowed to make up for the change, which is what a
-    local optimum leaves to gain.
+    Least energy with the candidate minus least energy without it and without its siblings,
+    other candidates for the same thing. One exchange may make up for the change, which is what
+    a local optimum leaves to gain. Negative: the scene is explained worse without that thing.
 
     :param energy: JointEnergy at its optimum; it is left there.
+    :param siblings: (n, n) bool, symmetric, True on the diagonal.
     """
     members = np.flatnonzero(energy.mask)
-    change = energy.joining_costs()
-    leave = change[members]
-    best = np.where(energy.mask, np.inf, change)
-    replaced = leave.copy()
+    joining = np.where(energy.mask, 0.0, energy.joining_costs())
+    leave = energy.deltas()[members]
+    without = np.full(energy.n, -np.inf)
     for i, a in enumerate(members):
         energy.flip(a)
         swapped = leave[i] + energy.deltas()
-        swapped[energy.mask] = np.inf
-        swapped[a] = np.inf
         energy.flip(a)
-        best = np.minimum(best, swapped)
-        replaced[i] = min(leave[i], swapped.min(initial=np.inf))
-    best[members] = -replaced
-    return best
+        swapped[members] = np.inf
+        joining = np.minimum(joining, swapped)
+        replaced = np.where(siblings[a], np.inf, swapped).min(initial=leave[i])
+        without[siblings[a]] = np.maximum(without[siblings[a]], replaced)
+    joining[members] = 0.0
+    return joining - np.where(np.isfinite(without), without, 0.0)
+
+
+def siblings_of(pool, models):
+    """Return (n, n) bool: same category, centres within 0.35 of the model's longest side."""
+    reach = 0.35 * np.array([models[c - 1].longest_side for c in pool.category])
+    apart = np.linalg.norm(pool.translation[:, None] - pool.translation[None], axis=2)
+    return (pool.category[:, None] == pool.category[None]) & (apart < reach[:, None])
 
 
 def features(evidence, pool, stats, lists, models, energy):
@@ -89,7 +97,7 @@ def features(evidence, pool, stats, lists, models, energy):
     n = len(pool)
     if not n:
         return np.zeros((0, len(FEATURES)), np.float32)
-    margin = margins(energy) / evidence.scale
+    margin = margins(energy, siblings_of(pool, models)) / evidence.scale
     shown = np.maximum(stats[:, kernel.SHOWN], 1)
     agree = np.maximum(stats[:, kernel.AGREE], 1)
     extents = np.array([models[c - 1].extents for c in pool.category])

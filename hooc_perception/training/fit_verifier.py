@@ -42,19 +42,21 @@ class VerifierConfig(Config):
                               'Growth of the forest.')
 
 
-def verifier_table(models, cameras, classifier, config, profile, seed, max_instances=0, n_jobs=1,
-                   progress=None):
+def verifier_table(models, cameras, classifier, config, scenes, profile, seed, max_instances=0,
+                   n_jobs=1, progress=None):
     """
     Return (x (n, FEATURES) float32, right (n,) uint8) of all candidates in the running.
 
+    :param scenes: FusedScenesConfig of the classifier: what its scenes look like.
+    :param profile: name of the profile whose chain parses.
     :param progress: called with 1 after every scene.
     """
     chain = profile_of(profile)
-    repeats = min(max_instances, 4) or 3
+    base = scene_config(scenes, min(max_instances, 4) or 3)
     with Parallel(n_jobs=n_jobs, return_as='generator') as parallel:
         parts = []
-        for part in parallel(delayed(_scene)(models, cameras, classifier, config, chain, seed,
-                                             max_instances, repeats, k)
+        for part in parallel(delayed(_scene)(models, cameras, classifier, config, base, chain,
+                                             seed, max_instances, k)
                              for k in range(config.verifier_scenes)):
             parts.append(part)
             if progress:
@@ -62,13 +64,13 @@ def verifier_table(models, cameras, classifier, config, profile, seed, max_insta
     return np.concatenate([x for x, _ in parts]), np.concatenate([y for _, y in parts])
 
 
-def _scene(models, cameras, classifier, config, chain, seed, max_instances, repeats, k):
+def _scene(models, cameras, classifier, config, base, chain, seed, max_instances, k):
     """Return (x, right) of the synthetic scene k."""
     rng = stage_rng(seed, 'verifier scenes', k)
     rig = 'random' if rng.random() < config.random_rigs else 'jittered'
     strength = float(rng.uniform(config.reshape_low, config.reshape_high))
-    scene = training_scene(models, cameras, rng, replace(
-        scene_config(FusedScenesConfig(), repeats), rig=rig, reshape_strength=strength))
+    scene = training_scene(models, cameras, rng,
+                           replace(base, rig=rig, reshape_strength=strength))
     pipeline = Pipeline(models, classifier, chain, seed, max_instances)
     observation = observe(scene.views)
     probabilities = classify(observation, classifier, chain.classify)
@@ -87,10 +89,12 @@ def _scene(models, cameras, classifier, config, chain, seed, max_instances, repe
 
 def fit_verifier(context, config):
     """Return the arrays of a verifier, `verifier_*`; see training/train.py for the context."""
+    scenes = next((c for c in context.configs if isinstance(c, FusedScenesConfig)),
+                  FusedScenesConfig())
     with context.bar(config.verifier_scenes, 'parsed scenes', 'scene') as bar:
         x, right = verifier_table(context.models, context.cameras, context.classifier, config,
-                                  context.profile, context.seed, context.max_instances,
-                                  context.jobs, bar.update)
+                                  scenes, context.profile, context.seed,
+                                  context.max_instances, context.jobs, bar.update)
     if not len(x) or right.min() == right.max():
         return {}
     rng = stage_rng(context.seed, 'verifier')

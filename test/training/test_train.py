@@ -8,6 +8,7 @@ from hooc_perception.cli import main
 from hooc_perception.core.classify import classify
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe
+from hooc_perception.core.verify import FEATURES, Verifier
 from hooc_perception.errors import HoocError
 from hooc_perception.models.folder import load_model_folder
 from hooc_perception.synthesis.rigs import ring
@@ -15,6 +16,7 @@ from hooc_perception.synthesis.training_scenes import training_scene
 from hooc_perception.training import train as module
 from hooc_perception.training.fit_forest import FitConfig
 from hooc_perception.training.fit_pixels import PixelFitConfig
+from hooc_perception.training.fit_verifier import VerifierConfig
 from hooc_perception.training.fused_scenes import draw_rows, FusedScenesConfig
 import numpy as np
 import pytest
@@ -24,7 +26,8 @@ TINY = {
     'paper': (PixelFitConfig(structure_scenes=10, leaf_scenes=10, trees=2, structure_pixels=150,
                              leaf_pixels=300, tests_per_node=60),),
     'fast': (FusedScenesConfig(scenes=10, quantile_scenes=4, objects_low=3, probes=16),
-             FitConfig(trees=5, features_per_node=40, min_leaf=5)),
+             FitConfig(trees=5, features_per_node=40, min_leaf=5),
+             VerifierConfig(verifier_scenes=4, forest=FitConfig(trees=4, features_per_node=9))),
 }
 
 
@@ -94,16 +97,14 @@ def test_same_seed_same_model_whatever_the_workers(trained, mesh_set):
         assert np.array_equal(value, trained.classifier[key]), key
 
 
-def test_extra_steps_add_arrays_and_see_those_before(mesh_set, trained, monkeypatch):
-    def step(context):
-        assert 'kind' in context.classifier and len(context.models) == 3
-        return {'verifier_weights': np.arange(4.0)}
-
-    monkeypatch.setattr(module, 'EXTRA_STEPS', [step])
-    arrays = module.train_classifier(trained.models, mesh_set.cameras, 'paper', 0, 2,
-                                     (PixelFitConfig(structure_scenes=2, leaf_scenes=2, trees=1,
-                                                     tests_per_node=5),), 1)
-    assert (arrays['verifier_weights'] == np.arange(4.0)).all()
+def test_a_verifier_is_learned_where_the_profile_has_one(trained):
+    verifier = Verifier.from_arrays(trained.classifier)
+    if trained.profile == 'paper':
+        assert verifier is None
+        return
+    x = np.random.default_rng(0).normal(size=(50, len(FEATURES))).astype(np.float32)
+    p = verifier.probability(x)
+    assert ((p >= 0) & (p <= 1)).all() and np.ptp(p) > 0
 
 
 def test_rows_favour_small_classes():

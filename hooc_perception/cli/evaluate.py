@@ -140,7 +140,7 @@ def _write(args, evaluations, contents, tables, scene_set, visibility, truth_ene
     if args.plots:
         from hooc_perception.evaluation.plots import write_plots
         names = scene_set.category_names
-        write_plots(args.plots, [(e.label, e.scores, e.per_category(names))
+        write_plots(args.plots, [(e.label, e.scores, e.per_category(names), e.verdicts())
                                  for e in evaluations if e.scores], names)
     if args.bop_csv:
         if not contents:

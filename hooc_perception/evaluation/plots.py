@@ -75,15 +75,44 @@ def error_curves(named, path):
     figure.savefig(path, dpi=130)
 
 
+def reliability(named, path, bins=5):
+    """
+    Draw the share of estimates that are right over their score, and how many there are.
+
+    :param named: sequence of (label, (score (n,), right (n,)) as from `scores.verdicts`).
+    """
+    figure, (ax,) = _axes(4.2, 3.6)
+    ax.plot([0, 1], [0, 1], color='0.7', lw=0.8, ls=':')
+    for k, (label, (score, right)) in enumerate(named):
+        at = np.clip((score * bins).astype(int), 0, bins - 1)
+        count = np.bincount(at, minlength=bins)
+        shown = count > 0
+        x, y = (np.bincount(at, weights=w, minlength=bins)[shown] / count[shown]
+                for w in (score, right))
+        colour = COLOURS[k % len(COLOURS)]
+        ax.plot(x, y, color=colour, lw=1, label=label)
+        ax.scatter(x, y, s=8 + 4 * np.sqrt(count[shown]), color=colour)
+        for xi, yi, n in zip(x, y, count[shown]):
+            ax.annotate(str(n), (xi, yi), (4, -9), textcoords='offset points', fontsize=7,
+                        color=colour)
+    ax.set_xlim(0, 1.02)
+    ax.set_ylim(0, 1.02)
+    ax.set_xlabel('mean score of the estimates')
+    ax.set_ylabel('share of them that are right')
+    ax.legend(frameon=False, fontsize=8, loc='upper left')
+    figure.savefig(path, dpi=130)
+
+
 def write_plots(folder, named, categories):
     """
-    Write categories.png and errors.png into a folder; return their paths.
+    Write categories.png, errors.png and reliability.png into a folder; return their paths.
 
-    :param named: sequence of (label, [SceneScore], per-category table).
+    :param named: sequence of (label, [SceneScore], per-category table, verdicts).
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    category_bars([(label, table) for label, _, table in named], categories,
-                  folder / 'categories.png')
-    error_curves([(label, scores) for label, scores, _ in named], folder / 'errors.png')
-    return [folder / 'categories.png', folder / 'errors.png']
+    files = [folder / f'{name}.png' for name in ('categories', 'errors', 'reliability')]
+    category_bars([(label, table) for label, _, table, _ in named], categories, files[0])
+    error_curves([(label, scores) for label, scores, _, _ in named], files[1])
+    reliability([(label, verdicts) for label, _, _, verdicts in named], files[2])
+    return files

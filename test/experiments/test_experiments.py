@@ -171,11 +171,12 @@ def test_damaged_records_are_named(tmp_path):
         run.load_records(tmp_path)
 
 
-def test_training_does_not_hang_on_the_code_of_parsing():
+def test_steps_hang_on_the_code_that_they_run():
     trained = fingerprint.modules_of(plan.CODE['train'])
+    # The verifier learns from scenes that the chain has parsed.
     assert {'hooc_perception.training.fit_pixels', 'hooc_perception.core.kernels.forest_pixels',
-            'hooc_perception.synthesis.settle'} <= set(trained)
-    assert 'hooc_perception.core.parse' not in trained
+            'hooc_perception.synthesis.settle', 'hooc_perception.core.parse'} <= set(trained)
+    assert 'hooc_perception.evaluation.scores' not in trained
     parsed = fingerprint.modules_of(plan.CODE['parse'])
     assert 'hooc_perception.core.parse' in parsed
     assert not any(name.startswith('hooc_perception.training') for name in parsed)
@@ -251,7 +252,8 @@ def test_pages_take_tables_between_their_markers(computed, tmp_path):
     assert 'old' not in new and 'kept' in new and '### Found and localized' in new
     assert new.startswith('before\n') and new.endswith('after\n') and '\nbetween\n' in new
     assert {path.name for path in written} == {'results.md', 'results_small_errors.png',
-                                               'results_small_categories.png'}
+                                               'results_small_categories.png',
+                                               'results_small_reliability.png'}
     page.write_pages(pages, docs / 'images', computed, ['small'], {})
     assert pages[0].read_text() == new
 

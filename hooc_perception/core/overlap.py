@@ -171,6 +171,6 @@ def pairwise(objects, models):
     return shares
 
 
-def union_shares(objects, models):
+def union_shares(objects, models, count=SAMPLES):
     """Return (n,) float64: share of each object's volume inside any of the others."""
-    return OverlapTerm(objects, models).shares(np.ones(len(objects), bool))
+    return OverlapTerm(objects, models, count).shares(np.ones(len(objects), bool))

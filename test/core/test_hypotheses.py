@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 FREE, SHELL, PRIOR = 0.7, 0.6, 0.03
 POINTS = 64
+NO_PULL = np.empty((0, 0))
 
 
 @pytest.fixture(scope='module')
@@ -43,7 +44,7 @@ def value(ground, h, c, n=POINTS):
     """Return the kernel's score of hypothesis `h` of model c."""
     return kernel.value(h, ground.t.points[c], ground.t.normals[c], n, ground.field.data,
                         ground.field.origin, ground.field.voxel, FREE, SHELL, PRIOR,
-                        np.empty((3, 3)))
+                        np.empty((3, 3)), NO_PULL)
 
 
 def posed(ground, h, c, n=POINTS):
@@ -106,7 +107,7 @@ def test_evidence_is_that_of_plain_numpy(ground):
     for h, c in zip(ground.H, ground.model_of):
         found = kernel.evidence(h, ground.t.points[c], ground.t.normals[c], 0, POINTS,
                                 ground.field.data, ground.field.origin, ground.field.voxel,
-                                np.empty((3, 3)))
+                                np.empty((3, 3)), NO_PULL)
         np.testing.assert_allclose(found, plain_evidence(ground, h, c), atol=1e-6)
         seen.append(found)
     assert (np.ptp(seen, axis=0) > 5).all(), 'the hypotheses are too much alike'
@@ -118,7 +119,7 @@ def test_evidence_adds_up_over_the_points(ground):
     def part(first, last):
         return np.array(kernel.evidence(
             h, ground.t.points[c], ground.t.normals[c], first, last, ground.field.data,
-            ground.field.origin, ground.field.voxel, np.empty((3, 3))))
+            ground.field.origin, ground.field.voxel, np.empty((3, 3)), NO_PULL))
 
     np.testing.assert_allclose(part(0, 40) + part(40, 64), part(0, 64))
 

@@ -54,7 +54,7 @@ def dense(setting, mask, models, config=CONFIG):
         total += config.base_cost + setting.stats[k, stat.SHOWN] * (
             config.complexity + config.size_prior * prior)
     chosen = setting.pool.take(mask)
-    overlap = union_shares(chosen, models).sum() if len(chosen) else 0.0
+    overlap = union_shares(chosen, models, 256).sum() if len(chosen) else 0.0
     return total + cost.sum() + config.overlap * overlap
 
 

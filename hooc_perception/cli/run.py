@@ -103,9 +103,7 @@ def play(bags, args, parameters):
     from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
     from tqdm import tqdm
     # A recorded frame set is complete however long it waits.
-    parameters['ingestion_node'].update(
-        max_frame_age_s=0.0, wait_for_answer_s=args.timeout, camera_timeout_s=0.0,
-        explain_after_s=0.0)
+    parameters['ingestion_node'].update(max_frame_age_s=0.0, wait_for_answer_s=args.timeout)
     # Each bag is a scene of its own, whatever stood there in the last one.
     parameters['parsing_node'].update(track_ttl_s=0.0)
     parameters[REPLAY] = {'wait_for_subscribers': LISTENERS, 'match_timeout_s': MATCH_TIMEOUT_S}

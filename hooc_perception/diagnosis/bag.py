@@ -20,6 +20,8 @@ import numpy as np
 IMAGE, INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'
 # As the ingestion node assembles frame sets.
 MAX_SPREAD_S = 0.1
+# As the ingestion node drops frames: max_frame_age_s.
+MAX_LAG_S = 1.0
 FEW_READINGS = 0.2
 # Farther than any depth camera sees; more means another unit.
 FARTHEST_M = 30.0
@@ -29,7 +31,7 @@ MIN_FOREGROUND = 200
 
 @dataclass
 class DepthStream:
-    """What was seen of one depth topic: sizes, stamps (s), readings, damage."""
+    """What was seen of one depth topic: sizes, stamps and their lags (s), readings, damage."""
 
     count: int = 0
     sizes: set = field(default_factory=set)
@@ -38,6 +40,7 @@ class DepthStream:
     readings: list = field(default_factory=list)
     medians: list = field(default_factory=list)
     damage: list = field(default_factory=list)
+    lags: list = field(default_factory=list)
 
 
 def check_bag(path):
@@ -126,6 +129,7 @@ def read_streams(path, known):
         firsts.setdefault(name, image)
         if 'depth' in name.lower() or image.encoding in ('16UC1', '32FC1', 'mono16'):
             _note(stream, image)
+            stream.lags.append(message.time_ns * 1e-9 - stream.stamps[-1])
     return firsts, infos, streams
 
 
@@ -174,6 +178,11 @@ def check_stream(topic, stream, known):
                       f'mm away, so {encodings} seems to hold metres or centimetres; publish '
                       '16UC1 in millimetres or 32FC1 in metres')
     yield from _check_stamps(topic, stream.stamps)
+    lag = float(np.median(stream.lags)) if stream.lags else 0.0
+    if abs(lag) > MAX_LAG_S and any(stream.stamps):
+        yield Finding(WARNING, topic, f'the stamps of {topic} lie {abs(lag):.3g} s '
+                      f'{"before" if lag > 0 else "after"} the clock of the recorder, so live '
+                      'nodes would drop the images; synchronise the clocks of the computers')
     if not known.reliable and stream.count > 1:
         yield Finding(WARNING, topic, f'{topic} was recorded from a best-effort publisher, so '
                       'images may be missing; let the driver publish reliably')

@@ -70,7 +70,7 @@ class IngestionNode(StageNode):
         tf = TfPoses(self)
         self.inputs = [CameraInput(self, name, declared_pose(self, name), tf, self.on_frame)
                        for name in self.names]
-        self.owned(self.destroy_timer, self.create_timer(0.5, self.on_timer))
+        self.steady_timer(0.5, self.on_timer)
 
     def activate(self):
         """Begin to listen; what was heard before does not count."""

@@ -65,7 +65,7 @@ class ReplayNode(StageNode):
     def activate(self):
         """Start to wait for subscribers."""
         self.began, self.player = self.now_ns(), None
-        self.timer = self.owned(self.destroy_timer, self.create_timer(0.002, self.on_timer))
+        self.timer = self.steady_timer(0.002, self.on_timer)
         self.say('waiting')
 
     def deactivate(self):

@@ -6,6 +6,7 @@ from collections import Counter
 import time
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 # Trouble that goes on is logged again after this time, then ever more seldom: a camera that is
@@ -27,7 +28,9 @@ class Diagnostics:
         """Publish for `node` from now on, whatever its lifecycle state."""
         self._node = node
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', 10)
-        self._timer = node.create_timer(1.0, self._publish)
+        # By the steady clock: simulated time may stand still, which is when one wants to know.
+        self._timer = node.create_timer(1.0, self._publish,
+                                        clock=Clock(clock_type=ClockType.STEADY_TIME))
         self._state = {}            # thing -> (level, code, sentence, monotonic seconds)
         self._values = {}           # thing -> {key: value}
         self._counts = Counter()    # (thing, code) -> number
@@ -94,7 +97,20 @@ class Diagnostics:
                 values=[KeyValue(key=k, value=_text(v)) for k, v in values.items()]))
         return result
 
+    def _look_at_clock(self):
+        """Say that nobody gives the simulated time that the node is to keep."""
+        node = self._node
+        if not (node.has_parameter('use_sim_time') and node.get_parameter('use_sim_time').value):
+            return
+        if not node.count_publishers('/clock'):
+            self.warn('clock', 'no_clock', 'use_sim_time is set, but nobody publishes /clock, so '
+                      'time stands still; start what plays the recording with its clock (ros2 '
+                      'bag play --clock), or set use_sim_time to false')
+        else:
+            self.ok('clock')
+
     def _publish(self):
+        self._look_at_clock()
         message = DiagnosticArray(status=self.statuses())
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)

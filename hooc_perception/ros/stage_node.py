@@ -18,6 +18,7 @@ from hooc_perception.ros.diagnostics import Diagnostics
 from hooc_perception.ros.misaddressed import misaddressed
 from hooc_perception.ros.parameters import Parameters
 from hooc_perception.ros.qos import overridable, qos
+from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
 PROFILES = ('paper', 'best', 'fast')
@@ -121,6 +122,11 @@ class StageNode(LifecycleNode):
         """Have `destroy(made)` called by cleaning up; return `made`."""
         self._mine.append((destroy, made))
         return made
+
+    def steady_timer(self, seconds, callback):
+        """Return a timer by the steady clock: simulated time may stand still or be set back."""
+        made = self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        return self.owned(self.destroy_timer, made)
 
     def guarded(self, callback):
         """

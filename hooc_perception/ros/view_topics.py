@@ -101,7 +101,7 @@ class ViewInput:
             node.subscription(kind, topic, self._taker(self._whole, part, self._deliver))
         self._needed = [*(f'views/{name}/depth_rect' for name in names),
                         *(topic for _, topic in others.values())]
-        node.owned(node.destroy_timer, node.create_timer(1.0, self._explain))
+        node.steady_timer(1.0, self._explain)
 
     def clear(self):
         """Forget what waits."""

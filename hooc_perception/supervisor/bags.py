@@ -86,9 +86,11 @@ class BagRunner:
             return
         if self._rig is not None:
             self._supervisor.bring_down(CHAIN)
+        # A recorded frame set is whole however long its images take.
+        own = {'ingestion_node': {'camera_timeout_s': 0.0, 'explain_after_s': 0.0},
+               'parsing_node': {'max_instances': limit}}
         for name in CHAIN:
-            self._supervisor.set_parameters(
-                name, {**rig, 'max_instances': limit} if name == 'parsing_node' else rig)
+            self._supervisor.set_parameters(name, {**rig, **own.get(name, {})})
         self._supervisor.bring_up(CHAIN)
         self._rig = rig, limit
 

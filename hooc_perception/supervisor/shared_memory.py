@@ -7,8 +7,10 @@ import fcntl
 import os
 from pathlib import Path
 import re
+import time
 
 FOLDER = Path('/dev/shm')
+YOUNG_S = 5.0
 # A segment of Fast DDS and the file that its owner keeps locked for as long as it lives.
 _LOCK_FILE = re.compile(r'fastrtps_[0-9a-f]{16}_el')
 
@@ -28,7 +30,9 @@ def free_orphans(folder=FOLDER):
         if not _LOCK_FILE.fullmatch(lock.name):
             continue
         with suppress(OSError):
-            if lock.stat().st_uid != os.getuid():
+            status = lock.stat()
+            # One that is being made has no lock yet.
+            if status.st_uid != os.getuid() or time.time() - status.st_mtime < YOUNG_S:
                 continue
             with open(lock, 'rb') as file:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)    # fails while it lives

@@ -268,6 +268,16 @@ def test_models_that_do_not_fit_the_rig(sound, cameras, word):
     assert word in finding.text and finding.level == (OK if cameras == 3 else WARNING)
 
 
+@pytest.mark.parametrize('seconds, word', [(-100, '100 s before'), (7, '7 s after')])
+def test_clocks_that_are_off(sound, tmp_path, seconds, word):
+    def edit(topic, message, i):
+        if '/depth/' in topic:
+            message.header.stamp.sec += seconds
+        return message
+    text = found(rewritten(sound, tmp_path / 'bag', edit), WARNING)
+    assert word in text and 'synchronise' in text
+
+
 def test_metres_in_whole_numbers(sound, tmp_path):
     def edit(topic, message, i):
         if topic.endswith('image_raw'):

@@ -110,15 +110,19 @@ def test_only_shared_memory_without_an_owner_is_removed(tmp_path):
         path = tmp_path / f'fastrtps_{number:016x}'
         path.write_bytes(bytes(1000))
         path.with_name(path.name + '_el').touch()
+        os.utime(path.with_name(path.name + '_el'), (1e9, 1e9))
         return path
 
     dead, living, other = segment(1), segment(2), tmp_path / 'fastrtps_port7411_el'
     other.touch()
+    young = segment(3)
+    young.with_name(young.name + '_el').touch()
     with open(living.with_name(living.name + '_el')) as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
         assert free_orphans(tmp_path) == 1000
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted(
-        [living.name, living.name + '_el', other.name]) and not dead.exists()
+        [living.name, living.name + '_el', young.name, young.name + '_el', other.name])
+    assert not dead.exists()
 
 
 def test_fast_dds_locks_what_it_lives_in(own_environment, monkeypatch):
@@ -129,6 +133,7 @@ def test_fast_dds_locks_what_it_lives_in(own_environment, monkeypatch):
     before = set(FOLDER.glob('fastrtps_*_el'))
     with Supervisor((REPLAY,), isolated=True) as supervisor:
         made = {p for p in set(FOLDER.glob('fastrtps_*_el')) - before if 'port' not in p.name}
+        monkeypatch.setattr('hooc_perception.supervisor.shared_memory.YOUNG_S', 0.0)
         free_orphans()
         assert made <= set(FOLDER.glob('fastrtps_*_el'))
         supervisor.state(REPLAY)

@@ -187,3 +187,17 @@ def test_what_may_change_while_running_does(bench, name, value, word):
         assert word in result.reason.lower()
     else:
         assert getattr(node.config, name) == value
+
+
+def test_a_simulated_clock_that_nobody_gives_is_named(bench):
+    from rosgraph_msgs.msg import Clock as ClockMessage
+    node = bench.add(ingestion_node.IngestionNode, cameras=['a'], warm_up=False,
+                     use_sim_time=True, explain_after_s=0.5)
+    assert node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
+    assert bench.spin(lambda: 'clock' in bench.reasons(node))
+    assert bench.reasons(node)['clock'][0] == 'no_clock'
+    # What else is wrong is said though time stands still.
+    assert bench.spin(lambda: bench.reasons(node).get('a', ' ')[0] == 'no_publisher')
+    publisher = bench.peer.create_publisher(ClockMessage, '/clock', 1)
+    assert bench.spin(lambda: node.count_publishers('/clock'))
+    publisher.publish(ClockMessage(clock=node.get_clock().now().to_msg()))

@@ -48,7 +48,7 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
                              0.0, 1000.0)
     verify_weight: float = param(80.0, 'joint: worth of the odds that the verifier gives a '
                                  'candidate, each unit of their logarithm', 'px', 0.0, 1000.0)
-    missing_against_false: float = param(3.0, 'joint: how much worse it is to miss an object than '
+    missing_against_false: float = param(2.0, 'joint: how much worse it is to miss an object than '
                                          'to report a false one', '', 0.01, 100.0)
     overlap: float = param(300.0, 'joint: cost of an object inside others', 'px', 0.0, 1e5)
     deadline_s: float = param(0.0, 'joint: seconds after which the best so far is the answer, '

@@ -63,3 +63,13 @@ def test_every_pinned_direct_dependency_is_explained():
     aliases = {'opencv-contrib-python-headless': 'opencv', 'networkx': 'trimesh'}
     missing = [name for name in names if aliases.get(name, name).lower() not in text]
     assert not missing
+
+
+@pytest.mark.parametrize('page', ['troubleshooting.md', 'planners.md'])
+def test_names_of_parameters_and_reasons_exist(page):
+    """A name in the pages that are read in need, such as `max_frame_age_s`, is one in the code."""
+    code = '\n'.join(path.read_text() for path in (ROOT / 'hooc_perception').rglob('*.py'))
+    text = re.sub(r'```.*?```', '', (ROOT / 'docs' / page).read_text(), flags=re.S)
+    names = {name.rpartition('.')[2] for name in re.findall(r'`([a-z][a-z_.]*_[a-z_.]*)`', text)}
+    unknown = {name for name in names if not re.search(rf'\b{re.escape(name)}\b', code)}
+    assert len(names) > 1 and not unknown

@@ -29,7 +29,7 @@ ALLOWED = {
     'evaluation': {'numpy', 'scipy', 'yaml', 'cv2', 'PIL', 'sklearn', 'matplotlib', 'jinja2',
                    'markupsafe', 'pyrender', 'OpenGL', 'trimesh', 'open3d', 'tqdm',
                    'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.scenes'},
-    'ros': {'numpy', 'rclpy', 'hooc_perception.core'},
+    'ros': {'numpy', 'scipy', 'rclpy', 'hooc_perception.core'},
     'nodes': {'numpy', 'rclpy', 'hooc_perception.core', 'hooc_perception.ros',
               'hooc_perception.models.folder'},
     'benchmark': {'numpy', 'scipy', 'cv2', 'open3d', 'sklearn', 'manifold3d', 'trimesh',

@@ -94,7 +94,7 @@ def _baseline(args, scene_set, models):
 
 def _tables(evaluations, scene_set, visibility, truth_energy, stages):
     """Return every table that the inputs give."""
-    from hooc_perception.evaluation import paper_tables, stage_tables
+    from hooc_perception.evaluation import certainty, paper_tables, stage_tables
 
     tables = [paper_tables.visibility_summary(visibility)] if visibility else []
     tables += [paper_tables.score_table(evaluations, setting) for setting in 'AB']
@@ -105,6 +105,7 @@ def _tables(evaluations, scene_set, visibility, truth_energy, stages):
     for e in evaluations:
         if e.scores:
             tables.append(paper_tables.category_table(e, scene_set.category_names))
+            tables += [certainty.score_table(e), certainty.sigma_table(e)]
         tables.append(paper_tables.mask_table(e))
     if stages:
         tables.append(stage_tables.stage_table(stages))
@@ -140,8 +141,9 @@ def _write(args, evaluations, contents, tables, scene_set, visibility, truth_ene
     if args.plots:
         from hooc_perception.evaluation.plots import write_plots
         names = scene_set.category_names
-        write_plots(args.plots, [(e.label, e.scores, e.per_category(names), e.verdicts())
-                                 for e in evaluations if e.scores], names)
+        write_plots(args.plots, [(e.label, e.scores, e.per_category(names))
+                                 for e in evaluations if e.scores], names,
+                    [e for e in evaluations if e.scores])
     if args.bop_csv:
         if not contents:
             raise HoocError('--bop-csv needs a results file to write; name one')

@@ -21,6 +21,8 @@ def add_arguments(parser):
     parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--true-poses', action='store_true',
                         help='setting B: the true poses are among the candidates')
+    parser.add_argument('--sigmas', action='store_true',
+                        help='also estimate how far off each pose may be')
     parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
                         help='change one parameter of the profile; may be repeated')
 
@@ -41,7 +43,8 @@ def run(args):
     chosen = with_overrides(profile(args.profile or folder.profile),
                             overrides_of(args.set_parameter))
     seed = folder.seed if args.seed is None else args.seed
-    pipeline = Pipeline(folder.models, folder.classifier, chosen, seed, scene_set.max_instances)
+    pipeline = Pipeline(folder.models, folder.classifier, chosen, seed, scene_set.max_instances,
+                        args.sigmas)
     scenes = (scene_set.selected(args.scene) if args.scene else scene_set).scenes
     for scene in scenes if args.true_poses else ():
         if scene.truth is None:

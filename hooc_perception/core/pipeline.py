@@ -2,15 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """The method in one screen: from depth images to the objects on the table."""
 
-from dataclasses import replace
 import time
 
 from hooc_perception.core.classify import classify
+from hooc_perception.core.finish import finished, with_sigmas
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe, rectify
 from hooc_perception.core.parse import parse
 from hooc_perception.core.propose import propose, propose_more
-from hooc_perception.core.symmetry import canonical_objects
 from hooc_perception.core.verify import Verifier
 
 
@@ -22,10 +21,12 @@ class Pipeline:
     :param classifier: dict of arrays, as training wrote it.
     :param profile: core.profiles.Profile.
     :param max_instances: most objects of one category in a scene, 0 = no limit.
+    :param sigmas: whether to estimate how far off the poses are.
     """
 
-    def __init__(self, models, classifier, profile, seed=0, max_instances=0):
+    def __init__(self, models, classifier, profile, seed=0, max_instances=0, sigmas=False):
         """Keep what all scenes share."""
+        self.sigmas = sigmas
         self.models, self.classifier, self.profile = tuple(models), classifier, profile
         self.seed, self.max_instances = seed, max_instances
         self.verifier = Verifier.from_arrays(classifier)
@@ -54,8 +55,12 @@ class Pipeline:
             pool = change_pool(pool)
         scene = parse(observation, probabilities, pool, self.models, p.parse, self.rng('parse'),
                       self.max_instances, self.more(observation, probabilities), self.verifier)
-        return replace(scene, objects=canonical_objects(scene.objects, self.models)).timed(
-            **seconds)
+        if self.sigmas:
+            clock = time.monotonic()
+            scene = lap('sigmas', with_sigmas(scene, observation, probabilities, self.models,
+                                              p.parse, self.rng('sigmas')))
+        return finished(scene, observation, self.models, p.parse,
+                        self.verifier is not None).timed(**seconds)
 
     def more(self, observation, probabilities):
         """Return the re-proposal that `parse` calls each round."""

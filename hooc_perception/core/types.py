@@ -200,13 +200,15 @@ class ParsedScene:
     """
     The answer for one frame set, with its evidence.
 
-    :ivar objects: the chosen candidates, refined; `score` in [0, 1].
+    :ivar objects: the chosen candidates, refined; `score` in [0, 1], see core.finish.
     :ivar energy: Eq. 1 of the chosen subset (for every profile, so that they compare).
     :ivar visible_ratio: (n,) float32 share of each object's rendered pixels that are in sight.
     :ivar residual_m: (n,) float32 mean absolute depth residual over the pixels where it agrees.
     :ivar energy_delta: (n,) float32 rise of the search's own energy if the object is removed.
     :ivar n_views: (n,) uint8 number of views that show it.
     :ivar pool: every candidate that was considered.
+    :ivar sigma_t, sigma_r: (n,) float32, metres and radians within which 68 % of the errors lie,
+        see core.uncertainty; NaN where that is not known, None where nobody asked.
     :ivar converged: False where a deadline ended the search.
     :ivar seconds: wall time of each stage.
     """
@@ -220,6 +222,8 @@ class ParsedScene:
     pool: Candidates
     converged: bool = True
     seconds: dict = field(default_factory=dict)
+    sigma_t: np.ndarray | None = None
+    sigma_r: np.ndarray | None = None
 
     def timed(self, **seconds):
         """Return a copy whose `seconds` also hold the given stages."""

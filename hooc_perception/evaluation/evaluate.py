@@ -11,7 +11,7 @@ from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.bop import bop_score
 from hooc_perception.evaluation.masks import rectified_labels, score_masks
 from hooc_perception.evaluation.matching import in_frame_of, posed
-from hooc_perception.evaluation.scores import per_category, score_scene, verdicts
+from hooc_perception.evaluation.scores import per_category, score_scene
 from hooc_perception.evaluation.visibility import scene_visibility
 from hooc_perception.models.mesh import load_mesh
 from hooc_perception.models.repair import closed
@@ -48,10 +48,6 @@ class Evaluation:
         """Return `scores.per_category` of all scenes with poses."""
         return per_category(self.scores, [self.estimates.get(s.name, []) for s in self.scores],
                             categories)
-
-    def verdicts(self):
-        """Return `scores.verdicts` of all scenes with poses."""
-        return verdicts(self.scores, [self.estimates.get(s.name, []) for s in self.scores])
 
 
 def scoring_models(scene_set, seed=0):

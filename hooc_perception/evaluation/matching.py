@@ -19,6 +19,7 @@ class PosedObject:
     :ivar rotation_xyzw: (4,) unit quaternion, model axes to world.
     :ivar size: (3,) extents along the model axes, metres.
     :ivar score: of an estimate; 1 for a true object.
+    :ivar sigma_t, sigma_r: of an estimate, metres and radians; NaN where nobody says.
     """
 
     category: str
@@ -26,6 +27,8 @@ class PosedObject:
     rotation_xyzw: np.ndarray
     size: np.ndarray
     score: float = 1.0
+    sigma_t: float = float('nan')
+    sigma_r: float = float('nan')
 
 
 def posed(thing):
@@ -37,7 +40,9 @@ def posed(thing):
                            np.asarray(get('translation'), np.float64).reshape(3),
                            rotation / np.linalg.norm(rotation),
                            np.asarray(get('size'), np.float64).reshape(3),
-                           1.0 if get('score') is None else float(get('score')))
+                           1.0 if get('score') is None else float(get('score')),
+                           *(float('nan') if get(name) is None else float(get(name))
+                             for name in ('sigma_t', 'sigma_r')))
     except (TypeError, ValueError) as error:
         raise HoocError(f'object {get("category")!r} has no usable pose: {error}; give '
                         'translation (3), rotation_xyzw (4) and size (3)') from None

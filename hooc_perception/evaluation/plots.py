@@ -4,6 +4,7 @@
 
 from pathlib import Path
 
+from hooc_perception.evaluation.certainty import reliability, sigma_errors, verdicts
 from hooc_perception.evaluation.scores import pose_errors
 import matplotlib
 from matplotlib.figure import Figure
@@ -75,44 +76,49 @@ def error_curves(named, path):
     figure.savefig(path, dpi=130)
 
 
-def reliability(named, path, bins=5):
+def certainty_plot(evaluations, path):
     """
-    Draw the share of estimates that are right over their score, and how many there are.
+    Draw scores against the share that is right, and errors against sigmas.
 
-    :param named: sequence of (label, (score (n,), right (n,)) as from `scores.verdicts`).
+    :param evaluations: sequence of Evaluation; those without sigmas are left out of the second.
     """
-    figure, (ax,) = _axes(4.2, 3.6)
-    ax.plot([0, 1], [0, 1], color='0.7', lw=0.8, ls=':')
-    for k, (label, (score, right)) in enumerate(named):
-        at = np.clip((score * bins).astype(int), 0, bins - 1)
-        count = np.bincount(at, minlength=bins)
-        shown = count > 0
-        x, y = (np.bincount(at, weights=w, minlength=bins)[shown] / count[shown]
-                for w in (score, right))
+    figure, axes = _axes(9.0, 3.6, 2)
+    axes[0].plot([0, 1], [0, 1], color='0.7', lw=0.8)
+    for k, e in enumerate(evaluations):
+        bins = np.array(reliability(*verdicts(e)), float).reshape(-1, 5)
         colour = COLOURS[k % len(COLOURS)]
-        ax.plot(x, y, color=colour, lw=1, label=label)
-        ax.scatter(x, y, s=8 + 4 * np.sqrt(count[shown]), color=colour)
-        for xi, yi, n in zip(x, y, count[shown]):
-            ax.annotate(str(n), (xi, yi), (4, -9), textcoords='offset points', fontsize=7,
-                        color=colour)
-    ax.set_xlim(0, 1.02)
-    ax.set_ylim(0, 1.02)
-    ax.set_xlabel('mean score of the estimates')
-    ax.set_ylabel('share of them that are right')
-    ax.legend(frameon=False, fontsize=8, loc='upper left')
+        if len(bins):
+            # Where the true share lies, two to one, given so few.
+            error = np.sqrt((bins[:, 4] * bins[:, 2] + 1) * ((1 - bins[:, 4]) * bins[:, 2] + 1)
+                            / (bins[:, 2] + 2) ** 2 / (bins[:, 2] + 3))
+            axes[0].errorbar(bins[:, 3], bins[:, 4], error, fmt='o-', ms=4, lw=1, color=colour,
+                             label=f'{e.label} ({int(bins[:, 2].sum())})')
+        pairs = sigma_errors(e)['t'] * 1000
+        if len(pairs):
+            axes[1].loglog(pairs[:, 1], np.maximum(pairs[:, 0], 0.2), 'o', ms=3, alpha=0.6,
+                           color=colour, label=e.label)
+            axes[1].loglog([1, 100], [1, 100], color='0.7', lw=0.8)
+    axes[0].set_xlabel('mean score')
+    axes[0].set_ylabel('share that is localized')
+    axes[0].legend(frameon=False, fontsize=8)
+    axes[1].set_xlabel('sigma_t, mm')
+    axes[1].set_ylabel('error of the centre, mm')
     figure.savefig(path, dpi=130)
 
 
-def write_plots(folder, named, categories):
+def write_plots(folder, named, categories, evaluations=()):
     """
-    Write categories.png, errors.png and reliability.png into a folder; return their paths.
+    Write categories.png and errors.png into a folder; return their paths.
 
-    :param named: sequence of (label, [SceneScore], per-category table, verdicts).
+    :param named: sequence of (label, [SceneScore], per-category table).
+    :param evaluations: sequence of Evaluation: also write certainty.png.
     """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    files = [folder / f'{name}.png' for name in ('categories', 'errors', 'reliability')]
-    category_bars([(label, table) for label, _, table, _ in named], categories, files[0])
-    error_curves([(label, scores) for label, scores, _, _ in named], files[1])
-    reliability([(label, verdicts) for label, _, _, verdicts in named], files[2])
-    return files
+    category_bars([(label, table) for label, _, table in named], categories,
+                  folder / 'categories.png')
+    error_curves([(label, scores) for label, scores, _ in named], folder / 'errors.png')
+    if evaluations:
+        certainty_plot(evaluations, folder / 'certainty.png')
+    names = ('categories.png', 'errors.png') + (('certainty.png',) if evaluations else ())
+    return [folder / name for name in names]

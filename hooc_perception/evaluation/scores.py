@@ -139,19 +139,3 @@ def per_category(scores, estimates_by_scene, categories):
             'rotation_rad': (float(np.median([o.rotation_rad for o in placed]))
                              if placed else None)}
     return out
-
-
-def verdicts(scores, estimates_by_scene):
-    """
-    Return (score (n,) float64, right (n,) bool) of all estimates.
-
-    Right is the estimate that localizes a true object; a second one for the same is wrong.
-
-    :param estimates_by_scene: sequence of sequences of PosedObject, in the order of `scores`.
-    """
-    score, right = [], []
-    for scene, estimates in zip(scores, estimates_by_scene):
-        hits = {o.estimate for o in scene.objects if o.localized}
-        score += [e.score for e in estimates]
-        right += [k in hits for k in range(len(estimates))]
-    return np.array(score, np.float64), np.array(right, bool)

@@ -20,7 +20,7 @@ from hooc_perception.scenes.files import write_atomically
 
 END = '<!-- end of results -->'
 SECTION = re.compile(r'(<!-- results: ([\w ]+) -->\n).*?(' + re.escape(END) + ')', re.S)
-PICTURES = ('categories', 'errors', 'reliability')
+PICTURES = ('errors', 'categories', 'certainty')
 
 
 def sections_of(root, sets, records):

@@ -9,6 +9,7 @@ import time
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.config import param
+from hooc_perception.core.finish import finished, with_sigmas
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe
 from hooc_perception.core.parse import parse
@@ -37,6 +38,8 @@ class ParsingConfig(AdapterConfig, TrackConfig, StageConfig):
 
     max_instances: int = param(-1, 'Objects of one category in a scene at most; 0 sets no '
                                "limit, -1 takes the model's.", '', -1, 1000)
+    sigmas: bool = param(True, 'Estimate sigma_t and sigma_r, for about 0.05 CPU seconds an '
+                         'object.', runtime=True)
     more_timeout_s: float = param(60.0, 'A round of re-proposal that the candidate node does not '
                                   'answer within this time brings nothing.', 's', 0.1, 600.0,
                                   runtime=True)
@@ -99,8 +102,9 @@ class ParsingNode(StageNode):
         start = time.monotonic()
         try:
             n = len(self.models)
+            probabilities = probabilities_from_message(messages['probabilities'], observation, n)
             parsed = parse(
-                observation, probabilities_from_message(messages['probabilities'], observation, n),
+                observation, probabilities,
                 candidates_from_messages(messages['poses'], messages['attributes'], n),
                 self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
                 self.max_instances, self.more.asker(stamp_ns, self.config.more_timeout_s),
@@ -108,6 +112,12 @@ class ParsingNode(StageNode):
         except HoocError as error:
             self.diagnostics.error('parse', 'refused', str(error))
             return
+        if self.config.sigmas:
+            parsed = with_sigmas(
+                parsed, observation, probabilities, self.models, self.parameters['parse'],
+                stage_rng(self.config.seed, 'sigmas'))
+        parsed = finished(parsed, observation, self.models, self.parameters['parse'],
+                          self.verifier is not None)
         self.tracker.config = self.config
         ids, objects = self.tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)

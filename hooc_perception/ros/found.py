@@ -25,8 +25,8 @@ class FoundObject:
     :ivar translation: (3,) float64 centre of its bounding box, target frame, metres.
     :ivar rotation_xyzw: (4,) float64, model axes to target frame.
     :ivar size: (3,) float64 extents along the model's axes, metres.
-    :ivar sigma_t, sigma_r: root mean square error of position (metres) and rotation (radians)
-        to expect, NaN = not estimated.
+    :ivar sigma_t, sigma_r: metres and radians within which 68 % of the errors lie, NaN = not
+        estimated.
     :ivar model: the GenericModel of its category.
     """
 
@@ -73,8 +73,10 @@ def found_scene(parsed, ids, models, stamp_ns, frame):
     :param models: tuple of GenericModel; class id c is models[c - 1].
     """
     found = parsed.objects
+    sigma_t, sigma_r = (np.full(len(found), np.nan) if sigma is None else sigma
+                        for sigma in (parsed.sigma_t, parsed.sigma_r))
     return FoundScene(stamp_ns, frame, tuple(
         FoundObject(int(ids[i]), int(found.category[i]), float(found.score[i]),
                     found.translation[i], found.rotation_xyzw[i], found.size[i].astype(float),
-                    float('nan'), float('nan'), models[int(found.category[i]) - 1])
+                    float(sigma_t[i]), float(sigma_r[i]), models[int(found.category[i]) - 1])
         for i in range(len(found))))

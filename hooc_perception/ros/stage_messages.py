@@ -24,6 +24,7 @@ SIZE = ('size_x', 'size_y', 'size_z')
 # Bits of `flags`.
 FLAG_SEARCH_STOPPED = 1     # a deadline ended the search before it converged
 FLAG_ONE_VIEW = 2           # only one camera shows the object
+FLAG_TURNED = 4             # turned by half a turn it would explain the images about as well
 
 
 def probabilities_message(probabilities, observation, names, head):
@@ -144,11 +145,14 @@ def objects_messages(parsed, ids, age_s, head):
     rows['score'], rows['category'], rows['id'] = objects.score, objects.category, ids
     for name in ('visible_ratio', 'residual_m', 'energy_delta', 'n_views'):
         rows[name] = getattr(parsed, name)
-    # Not estimated yet, and a zero would claim perfection.
-    rows['sigma_t'] = rows['sigma_r'] = np.nan
+    for name in ('sigma_t', 'sigma_r'):
+        sigma = getattr(parsed, name)
+        # Where nobody asked, a zero would claim perfection.
+        rows[name] = np.nan if sigma is None else sigma
     rows['age_s'] = age_s
     rows['flags'] = (0 if parsed.converged else FLAG_SEARCH_STOPPED) | np.where(
-        parsed.n_views == 1, FLAG_ONE_VIEW, 0)
+        parsed.n_views == 1, FLAG_ONE_VIEW, 0) | np.where(
+        rows['sigma_r'] > 3.1, FLAG_TURNED, 0)
     return (pose_array_message(objects.translation, objects.rotation_xyzw, head),
             cloud_message(rows, head))
 

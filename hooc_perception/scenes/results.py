@@ -24,6 +24,8 @@ def scene_result(name, parsed, category_names, seconds, **extra):
     """
     energy = {term: _finite(getattr(parsed.energy, term)) for term in _TERMS}
     found = parsed.objects
+    sigmas = {name: getattr(parsed, name) for name in ('sigma_t', 'sigma_r')
+              if getattr(parsed, name, None) is not None}
     objects = []
     for i in range(len(found)):
         objects.append({
@@ -35,7 +37,8 @@ def scene_result(name, parsed, category_names, seconds, **extra):
             'visible_ratio': _finite(parsed.visible_ratio[i]),
             'residual_m': _finite(parsed.residual_m[i]),
             'energy_delta': _finite(parsed.energy_delta[i]),
-            'n_views': int(parsed.n_views[i])})
+            'n_views': int(parsed.n_views[i]),
+            **{name: _finite(sigma[i]) for name, sigma in sigmas.items()}})
     return {'scene': name, 'seconds': float(seconds), 'energy': energy, 'objects': objects,
             'converged': bool(parsed.converged),
             'stage_seconds': {stage: float(s) for stage, s in parsed.seconds.items()}, **extra}

@@ -114,7 +114,8 @@ class Collector:
             found, Energy(energy['depth'], energy['probability'], energy['overlap']),
             rows['visible_ratio'].copy(), rows['residual_m'].copy(), rows['energy_delta'].copy(),
             rows['n_views'].copy(), pool, converged=summary['converged'],
-            seconds=summary['seconds'])
+            seconds=summary['seconds'], sigma_t=rows['sigma_t'].copy(),
+            sigma_r=rows['sigma_r'].copy())
         probabilities = self._parts['pixels/probabilities'].get(stamp_ns)
         arrived = max((t for s, t in self._arrived.items() if s >= stamp_ns), default=0)
         return Answer(stamp_ns, parsed, max(0.0, (self._published[stamp_ns] - arrived) * 1e-9),

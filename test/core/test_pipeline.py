@@ -5,13 +5,13 @@
 from dataclasses import replace
 
 from hooc_perception.core import pipeline
+from hooc_perception.core.finish import finished
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe, rectify
 from hooc_perception.core.parse import parse, ParseConfig
 from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile
 from hooc_perception.core.propose import propose, propose_more
-from hooc_perception.core.symmetry import canonical_objects
 from hooc_perception.core.types import Candidates
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -68,7 +68,7 @@ def test_the_chain_is_the_stages_one_after_the_other(desk, oracle, small_profile
 
     expected = parse(observation, desk.probabilities, pool, desk.models, p.parse,
                      stage_rng(5, 'parse'), 0, more)
-    objects = canonical_objects(expected.objects, desk.models)
+    objects = finished(expected, observation, desk.models, p.parse).objects
     for name in SAME:
         np.testing.assert_array_equal(getattr(scene.objects, name), getattr(objects, name))
         np.testing.assert_array_equal(getattr(scene.pool, name), getattr(expected.pool, name))

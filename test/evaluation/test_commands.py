@@ -52,7 +52,7 @@ def test_evaluate_writes_json_markdown_plots_and_csv(tiny_path, truth_file, tmp_
     assert 0 < scores['visibility']['10_1'][0]['total'] < 1
     assert '| **mean** |' in (out / 'a.md').read_text()
     assert len((out / 'a.csv').read_text().splitlines()) == 17
-    for name in ('categories.png', 'errors.png', 'reliability.png'):
+    for name in ('categories.png', 'errors.png', 'certainty.png'):
         assert min(Image.open(out / 'plots' / name).size) > 300
 
 

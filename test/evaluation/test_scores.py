@@ -11,7 +11,7 @@ import sys
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models, table_1
 from hooc_perception.evaluation.matching import match_by_centre, posed, PosedObject
-from hooc_perception.evaluation.scores import means, score_scene, verdicts
+from hooc_perception.evaluation.scores import means, score_scene
 from hooc_perception.scenes.scene_set import load_scene_set
 import numpy as np
 import pytest
@@ -42,9 +42,6 @@ def test_scores_of_a_hand_made_scene(models):
     assert [o.estimate for o in s.objects] == [0, 1, 3, None]
     assert s.objects[2].centre_m == pytest.approx(0.061)
     assert np.isnan(s.objects[3].centre_m)
-    score, right = verdicts([s, s], [estimates, [replace(e, score=0.5) for e in estimates]])
-    assert list(right) == 2 * [True, True, False, False, False]
-    assert list(score) == 5 * [1.0] + 5 * [0.5]
 
 
 def test_threshold_is_the_generic_models_size_not_the_true_ones(models):

@@ -253,7 +253,7 @@ def test_pages_take_tables_between_their_markers(computed, tmp_path):
     assert new.startswith('before\n') and new.endswith('after\n') and '\nbetween\n' in new
     assert {path.name for path in written} == {'results.md', 'results_small_errors.png',
                                                'results_small_categories.png',
-                                               'results_small_reliability.png'}
+                                               'results_small_certainty.png'}
     page.write_pages(pages, docs / 'images', computed, ['small'], {})
     assert pages[0].read_text() == new
 

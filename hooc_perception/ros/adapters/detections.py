@@ -7,6 +7,7 @@ from hooc_perception.ros.adapters.guard import messages_of
 from hooc_perception.ros.conversions import pose_message
 from hooc_perception.ros.found import FoundScene
 import numpy as np
+from scipy.stats import chi2
 
 
 class Detections:
@@ -48,10 +49,11 @@ def detections_message(scene, messages):
 
 def covariance(sigma_t, sigma_r):
     """
-    Return (36,) float64 for PoseWithCovariance, of root mean square errors over three axes.
+    Return (36,) float64 for PoseWithCovariance, of the radii that hold 68 % of the errors.
 
     All zeros, which in ROS means unknown (sensor_msgs/Imu), unless both are known.
     """
     if not np.isfinite([sigma_t, sigma_r]).all():
         return np.zeros(36)
-    return np.diag([sigma_t ** 2 / 3] * 3 + [sigma_r ** 2 / 3] * 3).ravel()
+    variances = np.square([sigma_t, sigma_r]) / chi2.ppf(0.68, 3)
+    return np.diag(np.repeat(variances, 3)).ravel()

@@ -50,8 +50,8 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
                                  'candidate, each unit of their logarithm', 'px', 0.0, 1000.0)
     missing_against_false: float = param(2.0, 'joint: how much worse it is to miss an object than '
                                          'to report a false one', '', 0.01, 100.0)
-    least_cost: float = param(20.0, 'joint: what an object costs at least, however probable: two '
-                              'candidates for one thing are both probable', 'px', -1e4, 1e4)
+    least_cost: float = param(40.0, 'joint: what an object costs at least, however probable, '
+                              'where a category may stand there more than once', 'px', 0.0, 1e4)
     overlap: float = param(300.0, 'joint: cost of an object inside others', 'px', 0.0, 1e5)
     deadline_s: float = param(0.0, 'joint: seconds after which the best so far is the answer, '
                               '0 = none', 's', 0.0, 3600.0, runtime=True)
@@ -193,8 +193,10 @@ class Search:
         """Let the odds of each candidate (n,) weigh in its cost; return self."""
         p = np.clip(probability, 0.02, 0.98)
         c = self.config
-        self.odds = np.maximum(c.least_cost, -c.verify_weight * (
-            np.log(p / (1 - p)) + np.log(c.missing_against_false)))
+        self.odds = -c.verify_weight * (np.log(p / (1 - p)) + np.log(c.missing_against_false))
+        if self.max_instances != 1:
+            # Two candidates for one thing are both probable; a limit of one would choose.
+            self.odds = np.maximum(self.odds, c.least_cost)
         return self
 
     def weighed(self):

@@ -33,7 +33,7 @@ def run(args):
     if args.seed < 0 or args.jobs < 0:
         raise HoocError('--seed and --jobs must not be negative')
     start = time.monotonic()
-    scene_set = load_scene_set(args.set)
+    scene_set = load_scene_set(args.set, with_scenes=False)
     with executor(args.executor):
         folder = train(scene_set, args.out, args.profile, args.seed, jobs=args.jobs)
     print(f'{folder.path}: {len(folder.models)} categories, profile {folder.profile}, '

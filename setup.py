@@ -40,7 +40,7 @@ setup(
     ],
     python_requires='>=3.11',
     install_requires=['setuptools'],
-    extras_require={'test': ['pytest']},
+    extras_require={'test': ['pytest'], 'dask': ['distributed']},
     zip_safe=False,
     entry_points={
         'console_scripts': [

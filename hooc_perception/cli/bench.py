@@ -25,10 +25,16 @@ def add_arguments(parser):
     parser.add_argument('--soak', type=float, metavar='MINUTES',
                         help='instead: run the nodes at 1 Hz for so long while cameras drop out '
                              'and return, and look whether their memory stays flat')
+    parser.add_argument('--growth', action='store_true',
+                        help='instead: how processor time and memory of a scene grow with views, '
+                             'categories, objects and pixels (--model, default the bundled one; '
+                             '--plot, --json)')
+    parser.add_argument('--profile', choices=('best', 'fast'),
+                        help="profile of --growth (default: the model's)")
     parser.add_argument('--bag', type=Path, metavar='BAG',
                         help='scene for --soak (default: the bundled one)')
     parser.add_argument('--plot', type=Path, metavar='FILE.png',
-                        help='draw the memory of the processes of --soak over time')
+                        help='draw what --growth measured, or the memory of --soak over time')
     parser.add_argument('--seed', type=int, default=0, help='default: %(default)s')
 
 
@@ -38,6 +44,8 @@ def run(args):
         return _fuzz(args.fuzz, args.seed)
     if args.soak is not None:
         return _soak(args)
+    if args.growth:
+        return _growth(args)
     from hooc_perception.benchmark import learning, parsing, rendering
     from hooc_perception.benchmark.measure import hold
     from hooc_perception.benchmark.scene import bench_scene
@@ -95,6 +103,48 @@ def _fuzz(cases, seed):
     for number, kind, text in result.failures:
         print(f'case {number} ({kind}): {text}')
     return int(bool(result.failures))
+
+
+def _growth(args):
+    """Measure how time and memory grow, print and draw it."""
+    from hooc_perception.benchmark.growth import grow, write_plot
+    from hooc_perception.cli.demo import bundle_root, MODEL
+    from hooc_perception.models.folder import load_model_folder
+    from tqdm import tqdm
+    folder = load_model_folder(args.model or bundle_root() / MODEL)
+    profile = args.profile or folder.profile
+    grown = grow(folder, profile, args.seed,
+                 each=lambda rows: tqdm(rows, desc='scenes', disable=None))
+    _print_growth(grown, profile)
+    if args.plot:
+        write_plot(args.plot, grown, f'A scene of 20 objects, 25 categories, three Kinect v2 '
+                   f'views (dotted), and what changes; profile {profile}')
+        print(args.plot)
+    if args.json:
+        args.json.parent.mkdir(parents=True, exist_ok=True)
+        rows = {axis: [{**vars(p), 'peak_mb': p.peak_mb if p.peak_mb == p.peak_mb else None}
+                       for p in points] for axis, points in grown.items()}
+        args.json.write_text(json.dumps({'format': 'hooc-growth/1', 'profile': profile,
+                                         'seed': args.seed, 'axes': rows}, indent=1) + '\n')
+        print(args.json)
+    return 0
+
+
+def _print_growth(grown, profile):
+    """Print a row for every point and how each axis grows."""
+    from hooc_perception.benchmark.growth import exponent
+    from hooc_perception.evaluation.tables import Table, to_text
+    rows, notes = [], []
+    for axis, points in grown.items():
+        rows += [(f'{axis} {p.setting[axis]:g}', f'{p.cpu_s:.2f}', f'{p.peak_mb:.0f}',
+                  p.standing, p.candidates, p.found) for p in points]
+        notes.append(f'{axis}: time as n^{exponent(points, axis, "cpu_s"):.2f}')
+    print(to_text(Table(
+        f'Growth of a scene, profile {profile}',
+        ('', 'CPU s', 'peak MB', 'standing', 'candidates', 'found'), tuple(rows),
+        ('', 'Processor seconds of all threads, one scene a row, measured once; kernels were '
+         'compiled before.', 'Peak of the whole process, libraries and model included. '
+         'Least squares: ' + ', '.join(notes) + '.'))))
 
 
 def _soak(args):

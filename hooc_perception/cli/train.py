@@ -5,6 +5,8 @@
 from pathlib import Path
 import time
 
+from hooc_perception.cli import executor_option
+
 HELP = ('Train a model from the generic meshes and the cameras of a scene set. Its scenes are '
         'never read. Profile paper learns for exactly this rig; best and fast serve any.')
 
@@ -19,17 +21,20 @@ def add_arguments(parser):
                         help='same seed, same model (default: %(default)s)')
     parser.add_argument('--jobs', type=int, default=0, metavar='N',
                         help='parallel workers, 0 = all cores; does not change the model')
+    executor_option.add_argument(parser)
 
 
 def run(args):
     """Train and say where the model is."""
     from hooc_perception.errors import HoocError
+    from hooc_perception.executor import executor
     from hooc_perception.scenes.scene_set import load_scene_set
     from hooc_perception.training.train import train
     if args.seed < 0 or args.jobs < 0:
         raise HoocError('--seed and --jobs must not be negative')
     start = time.monotonic()
-    folder = train(load_scene_set(args.set), args.out, args.profile, args.seed,
-                   jobs=args.jobs)
+    scene_set = load_scene_set(args.set, with_scenes=False)
+    with executor(args.executor):
+        folder = train(scene_set, args.out, args.profile, args.seed, jobs=args.jobs)
     print(f'{folder.path}: {len(folder.models)} categories, profile {folder.profile}, '
           f'{time.monotonic() - start:.0f} s')

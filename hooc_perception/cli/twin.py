@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc twin`: write the synthetic benchmark set."""
 
+from hooc_perception.cli import executor_option
+from hooc_perception.errors import HoocError
+
 HELP = ('Write a synthetic scene set in the likeness of HOOC: 25 categories, 5 scenes of 10 and '
         '4 of 20 objects at rest by physics, three Kinect v2. The same seed gives the same set.')
 
@@ -20,10 +23,17 @@ def add_arguments(parser):
     parser.add_argument('--strength', type=float, default=1.0, metavar='S',
                         help='how far objects depart from their generic models, 0 to 2 '
                         '(default 1)')
+    parser.add_argument('--jobs', type=int, default=0, metavar='N',
+                        help='parallel workers, 0 = all cores; does not change the set')
+    executor_option.add_argument(parser)
 
 
 def run(args):
     """Write the set."""
+    from hooc_perception.executor import executor
     from hooc_perception.synthesis.twin import TwinOptions, write_twin
+    if args.jobs < 0:
+        raise HoocError('--jobs must not be negative')
     options = TwinOptions(tuple(args.scene), args.cameras, args.repeat, args.strength)
-    print(write_twin(args.out, args.seed, options, progress=True))
+    with executor(args.executor):
+        print(write_twin(args.out, args.seed, options, progress=True, jobs=args.jobs or -1))

@@ -5,7 +5,7 @@
 from hooc_perception.evaluation.tables import Table
 import numpy as np
 
-SCORE_BINS = (0.0, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
+SCORE_BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
 
 
 def verdicts(evaluation):

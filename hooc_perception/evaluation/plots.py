@@ -91,13 +91,16 @@ def certainty_plot(evaluations, path):
             # Where the true share lies, two to one, given so few.
             error = np.sqrt((bins[:, 4] * bins[:, 2] + 1) * ((1 - bins[:, 4]) * bins[:, 2] + 1)
                             / (bins[:, 2] + 2) ** 2 / (bins[:, 2] + 3))
-            axes[0].errorbar(bins[:, 3], bins[:, 4], error, fmt='o-', ms=4, lw=1, color=colour,
+            share = bins[:, 4]
+            error = [np.minimum(error, share), np.minimum(error, 1 - share)]
+            axes[0].errorbar(bins[:, 3], share, error, fmt='o-', ms=4, lw=1, color=colour,
                              label=f'{e.label} ({int(bins[:, 2].sum())})')
         pairs = sigma_errors(e)['t'] * 1000
         if len(pairs):
             axes[1].loglog(pairs[:, 1], np.maximum(pairs[:, 0], 0.2), 'o', ms=3, alpha=0.6,
                            color=colour, label=e.label)
             axes[1].loglog([1, 100], [1, 100], color='0.7', lw=0.8)
+    axes[0].set_ylim(0, 1.02)
     axes[0].set_xlabel('mean score')
     axes[0].set_ylabel('share that is localized')
     axes[0].legend(frameon=False, fontsize=8)

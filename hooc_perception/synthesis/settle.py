@@ -250,6 +250,17 @@ def varied(config, rng):
 _MAKERS = OrderedDict()
 
 
+def body_maker(models):
+    """Return this process's BodyMaker of the models: their pieces are cut only once."""
+    key = models_key(models)
+    maker = _MAKERS.get(key)
+    if maker is None:
+        while len(_MAKERS) >= 4:
+            _MAKERS.popitem(last=False)
+        maker = _MAKERS[key] = BodyMaker(models)
+    return maker
+
+
 def settled_models(models, rng, scatter, strength, config=SettleConfig()):
     """
     Return a settled arrangement of a random subset of models, a list of PlacedObject.
@@ -262,12 +273,7 @@ def settled_models(models, rng, scatter, strength, config=SettleConfig()):
     """
     if not models:
         raise HoocError('a settled scene needs at least one model, but there are none')
-    key = models_key(models)
-    if key not in _MAKERS:
-        while len(_MAKERS) >= 4:
-            _MAKERS.popitem(last=False)
-        _MAKERS[key] = BodyMaker(models)
-    maker = _MAKERS[key]
+    maker = body_maker(models)
     count = int(rng.integers(scatter.objects_low, scatter.objects_high + 1))
     chosen = rng.permutation(np.tile(np.arange(len(models)), scatter.repeats))[:count] + 1
     bodies = [maker.body(int(c), rng, strength) for c in chosen]

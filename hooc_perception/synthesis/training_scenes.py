@@ -148,10 +148,11 @@ _SCATTERERS = {}
 def _scatterer(models, config):
     """Return this process's Scatterer of the models: collision shapes are built once."""
     key = (models_key(models), config)
-    if key not in _SCATTERERS:
+    scatterer = _SCATTERERS.get(key)
+    if scatterer is None:
         _SCATTERERS.clear()
-        _SCATTERERS[key] = Scatterer(models, config)
-    return _SCATTERERS[key]
+        scatterer = _SCATTERERS[key] = Scatterer(models, config)
+    return scatterer
 
 
 def _group(models, cameras, config, seed, stage, start, stop):

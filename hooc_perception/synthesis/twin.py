@@ -23,7 +23,8 @@ from hooc_perception.synthesis.raw_views import Caster
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.synthesis.room import draw_room, RoomConfig
 from hooc_perception.synthesis.sensor import miscalibrated, sense, SensorConfig
-from hooc_perception.synthesis.settle import BodyMaker, settle, SettleConfig
+from hooc_perception.synthesis.settle import body_maker, settle, SettleConfig
+import joblib
 import numpy as np
 from tqdm import tqdm
 import trimesh
@@ -67,7 +68,7 @@ class TwinOptions:
             raise HoocError(f'{self.cameras} cameras were asked for; give 1 to 8')
 
 
-def write_twin(out_dir, seed=0, options=TwinOptions(), progress=False):
+def write_twin(out_dir, seed=0, options=TwinOptions(), progress=False, jobs=1):
     """
     Write a scene set in the likeness of HOOC; return its folder.
 
@@ -75,6 +76,7 @@ def write_twin(out_dir, seed=0, options=TwinOptions(), progress=False):
     the options other than `scenes`, so a chosen scene is the one of the full set.
 
     :param out_dir: a folder that does not exist yet or is empty.
+    :param jobs: processes, -1 = all cores; the bytes are the same for any number.
     """
     meshes = {name: build() for name, build in CATALOGUE.items()}
     models = [derive(name, mesh, stage_rng(seed, 'twin/model', i), surface_points=64,
@@ -83,13 +85,14 @@ def write_twin(out_dir, seed=0, options=TwinOptions(), progress=False):
     true_cameras = kinect_rig(rng, options.cameras)
     cameras = tuple(miscalibrated(c, rng, CALIBRATION_RAD, CALIBRATION_M) for c in true_cameras)
     room = replace(draw_room(rng, ROOM), yaw=rng.normal(0.0, 0.1))
-    maker = BodyMaker(models)
     names = options.scenes or tuple(SCENES)
 
     def scenes():
-        for name in tqdm(names, disable=not progress, unit='scene', desc='twin'):
-            scene_rng = stage_rng(seed, 'twin/scene', list(SCENES).index(name))
-            yield _scene(name, maker, true_cameras, room, scene_rng, options)
+        parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
+        done = parallel(joblib.delayed(_scene)(
+            name, SCENES[name], tuple(models), true_cameras, room,
+            stage_rng(seed, 'twin/scene', list(SCENES).index(name)), options) for name in names)
+        yield from tqdm(done, total=len(names), disable=not progress, unit='scene', desc='twin')
 
     return write_scene_set(out_dir, f'twin_{seed}', meshes, cameras, scenes(),
                            max_instances=0 if options.repeat else 1)
@@ -110,9 +113,10 @@ def kinect_rig(rng, count=3):
     return tuple(cameras)
 
 
-def _scene(name, maker, cameras, room, rng, options):
-    """Return the NewScene of one name."""
-    placed, caster, visible = _arrangement(name, maker, cameras, room, rng, options)
+def _scene(name, count, models, cameras, room, rng, options):
+    """Return the NewScene of one name, with `count` objects."""
+    maker = body_maker(models)
+    placed, caster, visible = _arrangement(name, count, maker, cameras, room, rng, options)
     solids = [(o.vertices_world, o.faces) for o in placed]
     names = [maker.models[o.category - 1].name for o in placed]
     glass = tuple(i for i, n in enumerate(names) if n in TRANSLUCENT)
@@ -128,9 +132,8 @@ def _scene(name, maker, cameras, room, rng, options):
     return NewScene(name, tuple(depth), truth)
 
 
-def _arrangement(name, maker, cameras, room, rng, options):
+def _arrangement(name, count, maker, cameras, room, rng, options):
     """Return (objects, their Caster, visible shares) of a pile that keeps all its objects."""
-    count = SCENES[name]
     for _ in range(TRIES):
         classes = rng.choice(len(maker.models), count, replace=options.repeat) + 1
         bodies = [maker.body(int(c), rng, options.strength) for c in classes]

@@ -88,7 +88,7 @@ def fit(binned, y, n_classes, cuts, config, rng, n_jobs=1, progress=None):
             progress(1)
         return feature, threshold, left, quantised(counts)
 
-    return joined(Parallel(n_jobs=n_jobs, prefer='threads')(delayed(one)(*s) for s in seeds))
+    return joined(Parallel(n_jobs=n_jobs, require='sharedmem')(delayed(one)(*s) for s in seeds))
 
 
 def joined(trees):

@@ -141,8 +141,8 @@ def fit_view(structure, leaves, view, n_classes, config, seed, n_jobs=1, progres
             progress(1)
         return feature, threshold, left, test_view, offsets, leaf_p
 
-    trees = Parallel(n_jobs=n_jobs, prefer='threads')(delayed(one)(t)
-                                                      for t in range(config.trees))
+    trees = Parallel(n_jobs=n_jobs, require='sharedmem')(delayed(one)(t)
+                                                         for t in range(config.trees))
     return _joined(trees)
 
 

@@ -1,0 +1,189 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""How processor time and memory of a scene grow with views, categories, objects and pixels."""
+
+import ctypes
+from dataclasses import dataclass, replace
+import gc
+from pathlib import Path
+import time
+
+from hooc_perception.core.forest import Forest
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.pipeline import Pipeline
+from hooc_perception.core.profiles import profile as named_profile
+from hooc_perception.core.types import DepthView
+from hooc_perception.errors import HoocError
+from hooc_perception.synthesis.rigs import ring
+from hooc_perception.synthesis.scatter import ScatterConfig
+from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
+import numpy as np
+
+# Everything else stays at BASE while one of them changes; `pixels` is a factor on a Kinect v2's.
+BASE = {'views': 3, 'categories': 25, 'objects': 20, 'pixels': 1.0}
+AXES = {'views': (1, 2, 3, 4, 5, 6), 'categories': (10, 25, 50, 100), 'objects': (5, 10, 20, 40),
+        'pixels': (0.25, 0.5, 1.0, 2.0, 4.0)}
+WIDTH, HEIGHT, FOCAL = 512, 424, 366.0
+# Objects come from the first categories only, so that the scene stays when categories are added.
+PRESENT = 10
+SIZE_SPREAD = 0.15
+
+
+@dataclass(frozen=True)
+class Point:
+    """
+    One scene, measured once.
+
+    :ivar setting: {axis: value}, as BASE.
+    :ivar cpu_s: processor seconds of all threads, kernels compiled before.
+    :ivar peak_mb: most resident memory of the process meanwhile, libraries and model included;
+        NaN where the system does not say.
+    :ivar standing, candidates, found: how many objects stood there, were considered, came out.
+    """
+
+    setting: dict
+    cpu_s: float
+    peak_mb: float
+    standing: int
+    candidates: int
+    found: int
+
+
+def with_categories(models, classifier, count, rng):
+    """
+    Return (models, classifier) with `count` categories: fewer, or resized copies of them.
+
+    Copies share the probability of their original evenly; what is left out goes to the others.
+
+    :param models: tuple of GenericModel; `classifier` the arrays of the fused forest.
+    """
+    source = np.arange(count) % len(models)
+    more = []
+    for k, origin in enumerate(source):
+        model = models[origin]
+        more.append(model if k < len(models) else _resized(
+            model, f'{model.name}_{k // len(models) + 1}',
+            float(np.exp(SIZE_SPREAD * rng.standard_normal()))))
+    forest = Forest.from_arrays(classifier, 'forest_')
+    p = forest.leaf_p.astype(float)
+    p = np.column_stack([p[:, 0], p[:, 1 + source] / np.bincount(source)[source]])
+    total = p.sum(axis=1, keepdims=True)
+    p = np.where(total > 0, 255 * p / np.maximum(total, 1e-9), 0)
+    arrays = {**classifier, 'classes': np.uint8(count),
+              'forest_leaf_p': np.round(p).astype(np.uint8)}
+    return tuple(more), arrays
+
+
+def _resized(model, name, factor):
+    """Return a GenericModel of another size; resting poses and symmetry stay true."""
+    return replace(model, name=name, vertices=model.vertices * factor,
+                   extents=model.extents * factor,
+                   surface_points=model.surface_points * np.float32(factor),
+                   interior_points=model.interior_points * np.float32(factor),
+                   volume=model.volume * factor ** 3)
+
+
+def scene_views(models, views, objects, pixels, seed):
+    """Return (DepthViews, number of objects that stand there) of a synthetic scene."""
+    side = float(np.sqrt(pixels))
+    cameras = ring(stage_rng(seed, 'growth/rig', views), views, round(WIDTH * side),
+                   round(HEIGHT * side), FOCAL * side)
+    present = models[:PRESENT]
+    config = TrainingConfig(reshape_strength=1.0, scatter=ScatterConfig(
+        objects_low=objects, objects_high=objects, pose='resting', crowding=0.6, tries=200,
+        repeats=-(-objects // len(present))))
+    scene = training_scene(present, cameras, stage_rng(seed, 'growth/scene'), config)
+    return [DepthView(v.camera, v.depth) for v in scene.views], len(scene.objects)
+
+
+def grow(folder, profile=None, seed=0, axes=None, each=iter):
+    """
+    Return {axis: [Point]}; the common point is measured once.
+
+    :param folder: ModelFolder of a profile with the fused forest.
+    :param profile: name of another profile than the folder's own.
+    :param axes: {axis: values}, AXES by default.
+    :param each: wraps the list of settings, for a progress bar.
+    :raises HoocError: where the classifier is bound to a rig.
+    """
+    if 'forest_leaf_p' not in folder.classifier:
+        raise HoocError(f'{folder.path} was trained for one rig (profile {folder.profile}); '
+                        '--growth needs a model of the profile best or fast')
+    axes = axes or AXES
+    chosen = named_profile(profile or folder.profile)
+    settings = {axis: [{**BASE, axis: value} for value in values]
+                for axis, values in axes.items()}
+    distinct = {_key(s): s for rows in settings.values() for s in rows}
+    _measure(folder, chosen, {**BASE, 'views': 2, 'objects': 4, 'pixels': 0.25}, seed)
+    points = {key: _measure(folder, chosen, distinct[key], seed)
+              for key in each(sorted(distinct))}
+    return {axis: [points[_key(s)] for s in rows] for axis, rows in settings.items()}
+
+
+def _key(setting):
+    """Return a hashable, sortable form of a setting."""
+    return tuple(sorted(setting.items()))
+
+
+def _measure(folder, chosen, setting, seed):
+    """Return the Point of a setting."""
+    views, standing = scene_views(folder.models, setting['views'], setting['objects'],
+                                  setting['pixels'], seed)
+    models, classifier = with_categories(folder.models, folder.classifier,
+                                         setting['categories'], stage_rng(seed, 'growth/sizes'))
+    pipeline = Pipeline(models, classifier, chosen, seed)
+    _reset_peak()
+    start = time.process_time()
+    parsed = pipeline.parse_scene(views)
+    seconds = time.process_time() - start
+    return Point(setting, seconds, _peak_mb(), standing, len(parsed.pool), len(parsed.objects))
+
+
+def _reset_peak():
+    """Give freed memory back and let the kernel count the peak anew (Linux)."""
+    gc.collect()
+    try:
+        ctypes.CDLL(None).malloc_trim(0)
+        Path('/proc/self/clear_refs').write_text('5')
+    except (OSError, AttributeError):
+        pass
+
+
+def _peak_mb():
+    """Return the process's peak resident memory since `_reset_peak`."""
+    try:
+        for line in Path('/proc/self/status').read_text().splitlines():
+            if line.startswith('VmHWM:'):
+                return float(line.split()[1]) / 1024
+    except OSError:
+        pass
+    return float('nan')
+
+
+def exponent(points, axis, what):
+    """Return k of the least-squares fit value ~ n^k, `what` an attribute of Point."""
+    n = np.log([p.setting[axis] for p in points])
+    return float(np.polyfit(n, np.log([getattr(p, what) for p in points]), 1)[0])
+
+
+def write_plot(path, grown, title):
+    """Draw time and memory over every axis as one PNG."""
+    from matplotlib.figure import Figure
+    figure = Figure(figsize=(3.0 * len(grown), 5.2), layout='constrained')
+    axes = figure.subplots(2, len(grown), squeeze=False, sharey='row')
+    for column, (axis, points) in enumerate(grown.items()):
+        n = [p.setting[axis] for p in points]
+        for row, (what, label, colour) in enumerate((
+                ('cpu_s', 'processor seconds', '#3b6fb6'), ('peak_mb', 'peak MB', '#d9822b'))):
+            ax = axes[row, column]
+            ax.plot(n, [getattr(p, what) for p in points], 'o-', color=colour)
+            ax.axvline(BASE[axis], color='#6b7280', lw=0.8, ls=':')
+            ax.set_ylim(0, None)
+            ax.grid(alpha=0.3)
+            ax.spines[['top', 'right']].set_visible(False)
+            if column == 0:
+                ax.set_ylabel(label)
+        axes[1, column].set_xlabel('pixels, times 512 x 424' if axis == 'pixels' else axis)
+    figure.suptitle(title, fontsize=10)
+    Path(path).parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path, dpi=110)

@@ -47,6 +47,16 @@ def executor(where=LOCAL):
                         'of a Dask scheduler, such as dask=tcp://10.0.0.1:8786')
 
 
+def spread(function, *arguments):
+    """
+    Yield what `map` would: one call after the other here, side by side on a cluster.
+
+    :param function: importable under its name by the workers; `arguments`: iterables.
+    """
+    yield from joblib.Parallel(n_jobs=1, return_as='generator')(
+        joblib.delayed(function)(*row) for row in zip(*arguments))
+
+
 @contextmanager
 def _client(address):
     """Yield a connected distributed.Client whose workers run the same code as we do."""

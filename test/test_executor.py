@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The same results from a Dask cluster as from this process; one sentence where there is none."""
 
+import json
 import os
 import socket
 import sys
@@ -35,6 +36,10 @@ TINY = {
              FitConfig(trees=3, features_per_node=20, min_leaf=5)),
 }
 
+CHEAP = [word for text in ('propose.samples=3000', 'propose.pool=30', 'propose.polish=6',
+                           'propose.per_category=4', 'parse.rounds=0')
+         for word in ('--set-parameter', text)]
+
 
 @pytest.fixture(scope='module')
 def models():
@@ -47,8 +52,17 @@ def models():
 def cluster():
     """Return the address of a scheduler on this machine with two worker processes."""
     with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True,
-                                  host='127.0.0.1', dashboard_address=None) as cluster:
+                                  host='127.0.0.1', dashboard_address=':0') as cluster:
         yield cluster.scheduler_address
+
+
+@pytest.fixture(scope='module')
+def small_set(tmp_path_factory):
+    """Return the folder of a twin with two scenes of few objects, seen by one camera."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(twin, 'SCENES', {'a': 3, 'b': 2})
+        return str(twin.write_twin(tmp_path_factory.mktemp('small') / 'set', 5,
+                                   twin.TwinOptions(cameras=1)))
 
 
 def test_work_goes_to_the_cluster_inside_of_the_block_only(cluster):
@@ -82,6 +96,37 @@ def test_a_cluster_writes_the_same_twin_byte_for_byte(cluster, tmp_path, monkeyp
     assert len(here) > 8 and here == there
 
 
+def test_a_cluster_finds_the_same_objects(cluster, repository, small_set, tmp_path):
+    answers = []
+    for name, more in (('here', []), ('there', ['--executor', f'dask={cluster}'])):
+        out = tmp_path / f'{name}.json'
+        assert main(['parse', small_set, '--model', str(repository / 'models' / 'demo'),
+                     '--out', str(out), *CHEAP, *more]) == 0
+        answers.append([(scene['scene'], scene['objects'], scene['energy'])
+                        for scene in json.loads(out.read_text())['scenes']])
+    assert [scene for scene, _, _ in answers[0]] == ['a', 'b']
+    assert any(objects for _, objects, _ in answers[0])
+    assert answers[0] == answers[1]
+
+
+def test_a_cluster_says_the_same_about_the_stages(cluster, repository, small_set, tmp_path):
+    contents = []
+    for name, more in (('here', []), ('there', ['--executor', f'dask={cluster}'])):
+        out = tmp_path / f'{name}.json'
+        assert main(['evaluate', small_set, '--model', str(repository / 'models' / 'demo'),
+                     '--stages', '--json', str(out), *more]) == 0
+        contents.append(without(json.loads(out.read_text()), 'seconds'))
+    assert set(contents[0]['stages']) == {'a', 'b'}
+    assert contents[0] == contents[1]
+
+
+def without(content, key):
+    """Return JSON content without the values under a key, at any depth."""
+    if isinstance(content, dict):
+        return {k: without(v, key) for k, v in content.items() if k != key}
+    return [without(v, key) for v in content] if isinstance(content, list) else content
+
+
 def test_workers_with_other_code_are_refused(cluster, monkeypatch):
     real = module.check
     monkeypatch.setattr(module, 'check', lambda answers, ours: real(
@@ -99,7 +144,7 @@ def test_workers_without_the_package_are_named():
 
 def test_a_scheduler_without_workers_is_named():
     with distributed.LocalCluster(n_workers=0, processes=False, host='127.0.0.1',
-                                  protocol='tcp', dashboard_address=None) as empty:
+                                  protocol='tcp', dashboard_address=':0') as empty:
         with pytest.raises(HoocError, match='has no workers'), \
                 executor(f'dask={empty.scheduler_address}'):
             pass

@@ -5,6 +5,7 @@
 import json
 from pathlib import Path
 
+from hooc_perception.cli import executor_option
 from hooc_perception.errors import HoocError
 
 HELP = ("Score results against the truth of a scene set: the paper's Tables 1-4, stricter scores "
@@ -39,6 +40,7 @@ def add_arguments(parser):
     parser.add_argument('--plots', metavar='DIR', help='write pictures of the scores (PNG)')
     parser.add_argument('--bop-csv', metavar='FILE',
                         help="write the (first) results in BOP's CSV format")
+    executor_option.add_argument(parser)
 
 
 def run(args):
@@ -66,7 +68,9 @@ def run(args):
     truth_energy, stages = {}, {}
     if folder:
         from hooc_perception.evaluation.rerun import rerun
-        truth_energy, stages = rerun(scene_set, folder, args.stages)
+        from hooc_perception.executor import executor, spread
+        with executor(args.executor):
+            truth_energy, stages = rerun(scene_set, folder, args.stages, spread)
     tables = _tables(evaluations, scene_set, visibility, truth_energy, stages)
     if args.visibility or not contents:
         tables = [*_visibility_tables(visibility), *tables]

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc parse`: the whole chain over a scene set in one process, no ROS."""
 
+from itertools import repeat
 import time
 
+from hooc_perception.cli import executor_option
 from hooc_perception.errors import HoocError
 
 HELP = 'find the objects of a scene set, in one process without ROS'
@@ -25,6 +27,7 @@ def add_arguments(parser):
                         help='also estimate how far off each pose may be')
     parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
                         help='change one parameter of the profile; may be repeated')
+    executor_option.add_argument(parser)
 
 
 def run(args):
@@ -32,7 +35,7 @@ def run(args):
     from hooc_perception.cli.overrides import overrides_of
     from hooc_perception.core.pipeline import Pipeline
     from hooc_perception.core.profiles import profile, with_overrides
-    from hooc_perception.evaluation.true_poses import with_true_poses
+    from hooc_perception.executor import executor, spread
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.scenes.results import scene_result, write_results
     from hooc_perception.scenes.scene_set import load_scene_set
@@ -51,17 +54,24 @@ def run(args):
             raise HoocError(f'scene {scene.name} has no ground_truth.yaml, which --true-poses '
                             'needs; leave the option out')
     results = []
-    for scene in tqdm(scenes, desc='parsing', unit='scene', disable=None):
-        change = None
-        if args.true_poses:
-            change = with_true_poses(scene.truth, folder.models)
-        views = scene.depth()
-        start = time.monotonic()
-        parsed = pipeline.parse_scene(views, change)
-        results.append(scene_result(
-            scene.name, parsed, names, time.monotonic() - start, profile=chosen.name, seed=seed,
-            setting='B' if args.true_poses else 'A', stage_seconds=parsed.seconds,
-            **scene.world))
+    with executor(args.executor):
+        # One scene at a time on the cores at hand, which the stages share out between them.
+        done = spread(_parsed, repeat(pipeline), (scene.depth() for scene in scenes),
+                      (scene.truth if args.true_poses else None for scene in scenes))
+        for scene, (parsed, seconds) in zip(scenes, tqdm(
+                done, total=len(scenes), desc='parsing', unit='scene', disable=None)):
+            results.append(scene_result(
+                scene.name, parsed, names, seconds, profile=chosen.name, seed=seed,
+                setting='B' if args.true_poses else 'A', stage_seconds=parsed.seconds,
+                **scene.world))
     write_results(args.out, scene_set.name, results, setting='B' if args.true_poses else 'A')
     print(f'{len(results)} scenes, {sum(len(r["objects"]) for r in results)} objects -> '
           f'{args.out}')
+
+
+def _parsed(pipeline, views, truth):
+    """Return (ParsedScene, seconds) of DepthViews; of setting B where `truth` is given."""
+    from hooc_perception.evaluation.true_poses import with_true_poses
+    change = None if truth is None else with_true_poses(truth, pipeline.models)
+    start = time.monotonic()
+    return pipeline.parse_scene(views, change), time.monotonic() - start

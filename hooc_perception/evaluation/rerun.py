@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run the chain again on scenes with truth, to see inside: classifier, pool and parsing."""
 
+from itertools import repeat
+
 from hooc_perception.core.classify import classify
 from hooc_perception.core.eq1 import energy_of
 from hooc_perception.core.observe import observe, rectify
@@ -43,32 +45,43 @@ class Rerun:
         return out
 
 
-def rerun(scene_set, folder, stages=False):
+def rerun(scene_set, folder, stages=False, spread=map):
     """
     Return (truth's energies, what the stages lose) of the annotated scenes of a set.
 
     :param folder: ModelFolder.
     :param stages: False computes the energies only.
+    :param spread: as `map`; may run the calls elsewhere.
     :return: {scene: Energy}, {scene: {pixels, pool, answer}} as `pixel_scores`, StageLoss and
         SceneScore of the new answer.
     """
     again = Rerun(folder)
-    known = {m.name: m for m in again.models}
-    energies, losses = {}, {}
     annotated = [scene for scene in scene_set.scenes if scene.truth]
-    for scene in tqdm(annotated, desc='stages' if stages else 'energy of the truth',
-                      unit='scene', disable=None):
-        views = scene.depth()
-        truths = [t for t in map(posed, scene.truth) if t.category in known]
-        observation, probabilities = again.look(views)
-        energies[scene.name] = energy_of(observation, probabilities,
-                                         as_candidates(truths, again.models), again.models)
-        if not stages:
-            continue
-        parsed = again.pipeline.parse_scene(views)
-        answer = score_scene(scene.name, as_objects(parsed.objects, again.models), truths, known,
-                             sum(parsed.seconds.values()))
-        losses[scene.name] = {
-            'pixels': pixel_scores(probabilities, observation, truths, again.models),
-            'pool': pool_recall(parsed.pool, truths, again.models, answer), 'answer': answer}
+    done = spread(_of_scene, repeat(again), (scene.name for scene in annotated),
+                  (scene.depth() for scene in annotated), (scene.truth for scene in annotated),
+                  repeat(stages))
+    energies, losses = {}, {}
+    for scene, (energy, loss) in zip(annotated, tqdm(
+            done, total=len(annotated), desc='stages' if stages else 'energy of the truth',
+            unit='scene', disable=None)):
+        energies[scene.name] = energy
+        if stages:
+            losses[scene.name] = loss
     return energies, losses
+
+
+def _of_scene(again, name, views, truth, stages):
+    """Return (Energy of the truth, what the stages lose of one scene or None)."""
+    known = {m.name: m for m in again.models}
+    truths = [t for t in map(posed, truth) if t.category in known]
+    observation, probabilities = again.look(views)
+    energy = energy_of(observation, probabilities, as_candidates(truths, again.models),
+                       again.models)
+    if not stages:
+        return energy, None
+    parsed = again.pipeline.parse_scene(views)
+    answer = score_scene(name, as_objects(parsed.objects, again.models), truths, known,
+                         sum(parsed.seconds.values()))
+    return energy, {
+        'pixels': pixel_scores(probabilities, observation, truths, again.models),
+        'pool': pool_recall(parsed.pool, truths, again.models, answer), 'answer': answer}

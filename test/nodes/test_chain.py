@@ -63,7 +63,7 @@ class Stages:
                           pool.size, pool.score)
 
     def parse(self, observation, probabilities, pool, models, config, rng, max_instances=0,
-              more=None):
+              more=None, verifier=None):
         self.asked = [more(pool.take(self.chosen), turn) for turn in self.turns]
         self.given['parse'] = observation, probabilities, pool, rng.random(), max_instances
         if self.refuse:

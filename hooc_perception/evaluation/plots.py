@@ -80,11 +80,14 @@ def certainty_plot(evaluations, path):
     """
     Draw scores against the share that is right, and errors against sigmas.
 
-    :param evaluations: sequence of Evaluation; those without sigmas are left out of the second.
+    :param evaluations: sequence of Evaluation; those without sigmas are left out of the second
+        picture, and where none has any it is left out itself.
     """
-    figure, axes = _axes(9.0, 3.6, 2)
+    sigmas = [sigma_errors(e)['t'] * 1000 for e in evaluations]
+    n = 2 if any(map(len, sigmas)) else 1
+    figure, axes = _axes(4.5 * n, 3.6, n)
     axes[0].plot([0, 1], [0, 1], color='0.7', lw=0.8)
-    for k, e in enumerate(evaluations):
+    for k, (e, pairs) in enumerate(zip(evaluations, sigmas)):
         bins = np.array(reliability(*verdicts(e)), float).reshape(-1, 5)
         colour = COLOURS[k % len(COLOURS)]
         if len(bins):
@@ -95,7 +98,6 @@ def certainty_plot(evaluations, path):
             error = [np.minimum(error, share), np.minimum(error, 1 - share)]
             axes[0].errorbar(bins[:, 3], share, error, fmt='o-', ms=4, lw=1, color=colour,
                              label=f'{e.label} ({int(bins[:, 2].sum())})')
-        pairs = sigma_errors(e)['t'] * 1000
         if len(pairs):
             axes[1].loglog(pairs[:, 1], np.maximum(pairs[:, 0], 0.2), 'o', ms=3, alpha=0.6,
                            color=colour, label=e.label)
@@ -104,8 +106,9 @@ def certainty_plot(evaluations, path):
     axes[0].set_xlabel('mean score')
     axes[0].set_ylabel('share that is localized')
     axes[0].legend(frameon=False, fontsize=8)
-    axes[1].set_xlabel('sigma_t, mm')
-    axes[1].set_ylabel('error of the centre, mm')
+    if n == 2:
+        axes[1].set_xlabel('sigma_t, mm')
+        axes[1].set_ylabel('error of the centre, mm')
     figure.savefig(path, dpi=130)
 
 

@@ -53,7 +53,7 @@ def test_build_installs_everything(workspace):
     assert (share / 'hooc_perception/package.xml').exists()
     for node in NODES:
         assert os.access(prefix / 'lib/hooc_perception' / node, os.X_OK)
-    for folder, pattern in (('launch', '*.launch.py'), ('config', '*.yaml')):
+    for folder, pattern in (('launch', '*.launch.py'), ('config', '*')):
         assert ({path.name for path in (share / 'hooc_perception' / folder).glob('*')}
                 == {path.name for path in (ROOT / folder).glob(pattern)})
 

@@ -68,3 +68,14 @@ def bench():
     bench.executor.shutdown()
     rclpy.try_shutdown(context=context)
     claim.close()
+
+
+@pytest.fixture
+def cheap():
+    """Return parameters of nodes that do as little work as they can be told to."""
+    return {
+        'candidate_node': {'propose.samples': 300, 'propose.pool': 10, 'propose.refine_steps': 5,
+                           'propose.polish': 2, 'propose.polish_steps': 2,
+                           'propose.per_category': 2},
+        'parsing_node': {'parse.rounds': 0, 'parse.polish_steps': 0, 'parse.patience': 0,
+                         'parse.finalists': 1}}

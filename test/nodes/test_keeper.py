@@ -18,14 +18,6 @@ from hooc_perception.supervisor.keeper import Keeper  # noqa: E402
 from hooc_perception.supervisor.shared_memory import free_orphans  # noqa: E402
 from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor  # noqa: E402
 
-# As little work as the stages can be told to do: what is tested is who does it.
-CHEAP = {
-    'candidate_node': {'propose.samples': 300, 'propose.pool': 10, 'propose.refine_steps': 5,
-                       'propose.polish': 2, 'propose.polish_steps': 2,
-                       'propose.per_category': 2},
-    'parsing_node': {'parse.rounds': 0, 'parse.polish_steps': 0, 'parse.patience': 0,
-                     'parse.finalists': 1}}
-
 
 @pytest.fixture
 def own_environment(monkeypatch):
@@ -36,10 +28,10 @@ def own_environment(monkeypatch):
         monkeypatch.delenv(name)
 
 
-def cheap_chain(root):
+def cheap_chain(root, cheap):
     """Return the parameters of a chain that answers within a second or two."""
     common = {'model': str(root / 'models' / 'demo'), 'profile': 'fast', 'warm_up': False}
-    parameters = {name: {**common, **CHEAP.get(name, {})} for name in CHAIN}
+    parameters = {name: {**common, **cheap.get(name, {})} for name in CHAIN}
     parameters[REPLAY] = {'bag': str(root / 'bags' / 'demo'), 'loop': True, 'rate': 0.0,
                           'answer_timeout_s': 2.0}
     return parameters
@@ -54,8 +46,8 @@ def statuses(node):
     return latest
 
 
-def test_each_node_that_is_killed_comes_back(repository, own_environment):
-    with Supervisor((*CHAIN, REPLAY), cheap_chain(repository), isolated=True) as supervisor:
+def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment):
+    with Supervisor((*CHAIN, REPLAY), cheap_chain(repository, cheap), isolated=True) as supervisor:
         supervisor.bring_up()
         keeper = Keeper(supervisor, pause_s=0.1)
         heard, latest = [], statuses(supervisor.node)

@@ -24,13 +24,6 @@ raw_camera = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(raw_camera)
 
 SETS, MS = 2000, 10 ** 6
-# As little work as the stages can be told to do.
-CHEAP = {
-    'candidate_node': {'propose.samples': 300, 'propose.pool': 10, 'propose.refine_steps': 5,
-                       'propose.polish': 2, 'propose.polish_steps': 2,
-                       'propose.per_category': 2},
-    'parsing_node': {'parse.rounds': 0, 'parse.polish_steps': 0, 'parse.patience': 0,
-                     'parse.finalists': 1}}
 
 
 def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
@@ -87,7 +80,7 @@ def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
 
 
 @pytest.mark.slow
-def test_the_chain_of_processes_does_not_grow(repository, monkeypatch, tmp_path):
+def test_the_chain_of_processes_does_not_grow(repository, cheap, monkeypatch, tmp_path):
     from hooc_perception.benchmark.soak import soak, write_plot
     from hooc_perception.supervisor.supervisor import CHAIN
     for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE',
@@ -95,7 +88,7 @@ def test_the_chain_of_processes_does_not_grow(repository, monkeypatch, tmp_path)
         monkeypatch.setenv(name, '')
         monkeypatch.delenv(name)
     common = {'model': str(repository / 'models' / 'demo'), 'profile': 'fast'}
-    parameters = {name: {**common, **CHEAP.get(name, {})} for name in CHAIN}
+    parameters = {name: {**common, **cheap.get(name, {})} for name in CHAIN}
     parameters['ingestion_node']['camera_timeout_s'] = 1.0
     result = soak(repository / 'bags' / 'demo', parameters, 40.0, rate=2.0)
     assert result.deaths == 0 and result.answers >= 5

@@ -8,6 +8,7 @@ fused views.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 from hooc_perception.core.config import param
 from hooc_perception.core.evidence import hypotheses_of, PixelWeights
@@ -72,8 +73,8 @@ def propose(observation, probabilities, models, config=ProposeConfig(), rng=None
         extra = hypotheses_of(found, models), found.category
     H, category = sample(space, models, config, rng, config.samples, config.pool,
                          config.refine_steps, extra=extra)
-    return _ranked(space, models, config, rng, H, category, None, config.polish,
-                   config.polish_steps, config.per_category)
+    return _ranked(space, models, config, rng, H, category, lambda evidence: evidence.nothing,
+                   config.polish, config.polish_steps, config.per_category)
 
 
 def propose_more(observation, probabilities, models, objects, config=ProposeConfig(), rng=None):
@@ -85,29 +86,30 @@ def propose_more(observation, probabilities, models, objects, config=ProposeConf
     space = workspace_of(observation, probabilities, models)
     if config.method == 'fragments' or space.field is None:
         return Candidates.empty()
-    left = space.coarse.unexplained(_shown(space.coarse, objects, models))
+
+    @cache
+    def shown(evidence):
+        _, lists = evidence.explain(hypotheses_of(objects, models), objects.category,
+                                    PixelWeights(), lists=True)
+        return evidence.compose(np.arange(len(objects)), lists)
+
+    left = space.coarse.unexplained(shown(space.coarse))
     if not left.any():
         return Candidates.empty()
     H, category = sample(space, models, config, rng, config.round_samples, config.round_pool,
                          config.refine_steps, left + 0.02)
-    return _ranked(space, models, config, rng, H, category, objects, config.round_per_category,
+    return _ranked(space, models, config, rng, H, category, shown, config.round_per_category,
                    config.polish_steps, config.round_per_category)
 
 
-def _shown(evidence, objects, models):
-    """Return the context that `objects` (Candidates) make, None for none."""
-    if objects is None or not len(objects):
-        return None
-    _, lists = evidence.explain(hypotheses_of(objects, models), objects.category, PixelWeights(),
-                                lists=True)
-    return evidence.compose(np.arange(len(objects)), lists)
+def _ranked(space, models, config, rng, H, category, shown, n_polish, steps, n_keep):
+    """
+    Rank hypotheses in the images, refine the best there and return the best of those.
 
-
-def _ranked(space, models, config, rng, H, category, objects, n_polish, steps, n_keep):
-    """Rank hypotheses in the images, refine the best there and return the best of those."""
+    :param shown: callable Evidence -> the context of what is there already.
+    """
     weights, coarse = PixelWeights(), space.coarse
-    context = _shown(coarse, objects, models)
-    stats = coarse.explain(H, category, weights, context)
+    stats = coarse.explain(H, category, weights, shown(coarse))
     score = benefit(stats, config.complexity)
     # Half of the places go to the field's own order: it knows what the images hide.
     rows = np.union1d(distinct(H, category, score, models, n_polish),
@@ -118,12 +120,10 @@ def _ranked(space, models, config, rng, H, category, objects, n_polish, steps, n
                                 (space.coarsest, 8 * MANY, np.inf)):
         mine = np.flatnonzero((low <= covered) & (covered < high))
         if steps and len(mine):
-            context_here = context if evidence is coarse else _shown(evidence, objects, models)
             H[mine, :10] = evidence.polish(
-                H[mine], category[mine], np.full(len(mine), -1),
-                evidence.nothing if context_here is None else context_here, weights,
+                H[mine], category[mine], np.full(len(mine), -1), shown(evidence), weights,
                 config.complexity, 0.1, steps, (0.006, 0.08, 0.05), rng)
-    score = benefit(coarse.explain(H, category, weights, context), config.complexity)
+    score = benefit(coarse.explain(H, category, weights, shown(coarse)), config.complexity)
     rows = distinct(H, category, score, models, n_keep)
     return candidates_of(H[rows], category[rows], score[rows], models)
 

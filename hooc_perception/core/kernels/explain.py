@@ -4,7 +4,7 @@
 
 from hooc_perception.core.kernels import raster
 from hooc_perception.core.kernels.hypotheses import rotation_of
-from hooc_perception.core.kernels.pull import accumulate, multiply, pulled
+from hooc_perception.core.kernels.pull import accumulate, pulled, SCALES, stepped
 import numba as nb
 import numpy as np
 
@@ -235,23 +235,11 @@ def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start
             trial[:] = H[k]
             pulls = fresh
             if pulls:
-                pulled(here, agreeing, H[k], prior * agreeing * tolerance * tolerance, 0.45, 2.0,
+                pulled(here, agreeing, H[k], prior * agreeing * tolerance * tolerance, *SCALES,
                        trial)
                 fresh = False
             elif i > 0:
-                part = np.random.random()
-                if part < 0.75:
-                    for j in range(3):
-                        trial[j] += np.random.normal() * sigma_t * step
-                if part > 0.4:
-                    for j in range(3):
-                        q[j] = np.random.normal() * sigma_r * step / 2
-                    q[3] = 1.0
-                    multiply(q, trial[3:7], trial[3:7])
-                if part > 0.6 or part < 0.2:
-                    for j in range(3):
-                        trial[7 + j] = min(2.0, max(0.45, trial[7 + j] * np.exp(
-                            np.random.normal() * sigma_s * step)))
+                stepped(sigma_t, sigma_r, sigma_s, step, 1.0, q, trial)
             explain_one(trial, c, V, F, me[k], context, K, R_cw, t_cw, size, first, depth,
                         foreground, normals, patch, no_patches, p, p_row, tolerance, w_normal,
                         w_class, w_free, stats, there, -1, none_i, none_f, none_f)

@@ -7,7 +7,7 @@ A hypothesis is 10 numbers: translation (3, metres), quaternion xyzw (4), scale 
 (3, relative to the generic model).
 """
 
-from hooc_perception.core.kernels.pull import accumulate, multiply, pulled
+from hooc_perception.core.kernels.pull import accumulate, multiply, pulled, SCALES, stepped
 import numba as nb
 import numpy as np
 
@@ -279,23 +279,10 @@ def refine(seed, h, points, normals, n, field, origin, voxel, free_weight, shell
         trial[:] = h
         pulls = fresh
         if pulls:
-            pulled(here, n, h, prior * n * TRUNCATION_M * TRUNCATION_M, 0.45, 2.0, trial)
+            pulled(here, n, h, prior * n * TRUNCATION_M * TRUNCATION_M, *SCALES, trial)
             fresh = False
         else:
-            part = np.random.random()
-            if part < 0.75:
-                for k in range(3):
-                    trial[k] += np.random.normal() * sigma_t * step
-            if part > 0.4:
-                q[0] = np.random.normal() * sigma_r * step / 2
-                q[1] = np.random.normal() * sigma_r * step / 2
-                q[2] = np.random.normal() * sigma_r * step
-                q[3] = 1.0
-                multiply(q, trial[3:7], trial[3:7])
-            if part > 0.6 or part < 0.2:
-                for k in range(3):
-                    trial[7 + k] = min(2.0, max(0.45, trial[7 + k] * np.exp(
-                        np.random.normal() * sigma_s * step)))
+            stepped(sigma_t, sigma_r, sigma_s, step, 2.0, q, trial)
         score = value(trial, points, normals, n, field, origin, voxel, free_weight,
                       shell_weight, prior, R, there)
         if score > best:

@@ -14,6 +14,8 @@ import numpy as np
 
 # Longest step that the linearisation is trusted for: metres, radians, log scale.
 REACH = (0.02, 0.3, 0.15)
+# Least and greatest scale of a hypothesis along an axis.
+SCALES = (0.45, 2.0)
 # Share of the agreeing points that hold an unknown back which they do not determine.
 RIDGE = 0.02
 
@@ -104,3 +106,28 @@ def pulled(A, n, h, prior, low, high, out):
         out[7 + i] = min(high, max(low, h[7 + i] * np.exp(b[6 + i])))
     q = np.array((b[3] / 2, b[4] / 2, b[5] / 2, 1.0))
     multiply(q, out[3:7], out[3:7])
+
+
+@nb.njit(cache=True)
+def stepped(sigma_t, sigma_r, sigma_s, step, yaw, q, trial):
+    """
+    Move a hypothesis (10,) by a random step, in place: place, rotation, sizes or some of them.
+
+    :param sigma_t: metres, `sigma_r` radians, `sigma_s` log scale, all times `step`.
+    :param yaw: how much farther it turns about the vertical.
+    :param q: (4,) scratch.
+    """
+    part = np.random.random()
+    if part < 0.75:
+        for k in range(3):
+            trial[k] += np.random.normal() * sigma_t * step
+    if part > 0.4:
+        q[0] = np.random.normal() * sigma_r * step / 2
+        q[1] = np.random.normal() * sigma_r * step / 2
+        q[2] = np.random.normal() * sigma_r * step / 2 * yaw
+        q[3] = 1.0
+        multiply(q, trial[3:7], trial[3:7])
+    if part > 0.6 or part < 0.2:
+        for k in range(3):
+            trial[7 + k] = min(SCALES[1], max(SCALES[0], trial[7 + k] * np.exp(
+                np.random.normal() * sigma_s * step)))

@@ -14,6 +14,7 @@ from ament_index_python.packages import get_package_share_directory
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
 from launch.conditions import IfCondition
+from launch.event_handlers import OnProcessStart
 from launch.events import matches_action
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import LifecycleNode
@@ -28,7 +29,8 @@ CHAIN = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_nod
 def lifecycle_node(name, namespace, parameters, autostart):
     """Return the actions that start one node and, with `autostart`, bring it to active."""
     node = LifecycleNode(package='hooc_perception', executable=name, name=name,
-                         namespace=namespace, parameters=parameters, output='screen')
+                         namespace=namespace, parameters=parameters, output='screen',
+                         respawn=LaunchConfiguration('respawn'), respawn_delay=2.0)
 
     def change(transition):
         return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(node),
@@ -38,7 +40,10 @@ def lifecycle_node(name, namespace, parameters, autostart):
     activate = RegisterEventHandler(OnStateTransition(
         target_lifecycle_node=node, start_state='configuring', goal_state='inactive',
         entities=[change(Transition.TRANSITION_ACTIVATE)]))
-    return [node, activate, change(Transition.TRANSITION_CONFIGURE)]
+    # Every process that starts is configured, also one that takes the place of a dead one.
+    configure = RegisterEventHandler(OnProcessStart(
+        target_action=node, on_start=[change(Transition.TRANSITION_CONFIGURE)]))
+    return [activate, configure, node]
 
 
 def chain(context):
@@ -74,6 +79,8 @@ def generate_launch_description():
         DeclareLaunchArgument('use_sim_time', default_value='false'),
         DeclareLaunchArgument('autostart', default_value='true',
                               description='configure and activate the nodes'),
+        DeclareLaunchArgument('respawn', default_value='true',
+                              description='start a node again that has died'),
         DeclareLaunchArgument('params_file', default_value=params),
         OpaqueFunction(function=chain),
     ])

@@ -43,6 +43,9 @@ class ParsingConfig(AdapterConfig, TrackConfig, StageConfig):
     more_timeout_s: float = param(60.0, 'A round of re-proposal that the candidate node does not '
                                   'answer within this time brings nothing.', 's', 0.1, 600.0,
                                   runtime=True)
+    keep_answer_s: float = param(0.0, 'An answer that no new one has followed for so long is '
+                                 'taken back, as if by `reset`: nobody watches what it speaks '
+                                 'of. 0 = it stays.', 's', 0.0, 86400.0, runtime=True)
     detect_timeout_s: float = param(30.0, 'The detect service gives up after this time.', 's',
                                     0.1, 600.0, runtime=True)
 
@@ -74,6 +77,8 @@ class ParsingNode(StageNode):
         self.detect = DetectService(self, lambda: None if self.enabled else (
             'frame sets are ignored: call enable with true'))
         self.adapters = adapters_of(self)
+        self.answered = None        # monotonic s of the answer that stands, None: there is none
+        self.steady_timer(0.5, self.on_timer)
         self.owned(self.destroy_service, self.create_service(SetBool, 'enable', self.on_enable))
         self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
 
@@ -127,6 +132,7 @@ class ParsingNode(StageNode):
             adapter.publish(scene)
         age_s = (self.now_ns() - stamp_ns) * 1e-9
         self.output.publish(parsed, ids, stamp_ns, self.config.target_frame, age_s, left)
+        self.answered = time.monotonic()
         self.detect.answer(scene)
         self.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
                             energy=float(parsed.energy.total), age_s=age_s)
@@ -140,15 +146,28 @@ class ParsingNode(StageNode):
         response.message = 'parsing' if self.enabled else 'frame sets are ignored'
         return response
 
+    def on_timer(self):
+        """Take back an answer that has grown old."""
+        keep = self.config.keep_answer_s
+        if self.active and keep and self.answered and time.monotonic() - self.answered > keep:
+            self.diagnostics.warn('parse', 'answer_expired', 'no frame set has come for '
+                                  f'{keep:g} s (keep_answer_s); the last answer is taken back')
+            self.take_back()
+
     def on_reset(self, request, response):
         """Forget what waits to be joined and what was seen; take the last answer back."""
         self.input.clear()
         self.tracker.forget()
         if self.active:
-            for each in (*self.adapters, self.output):
-                each.clear(self.now_ns(), self.config.target_frame)
+            self.take_back()
         response.success, response.message = True, json.dumps({'objects': 0})
         return response
+
+    def take_back(self):
+        """Publish that nothing is known any more; ids stay with what returns in time."""
+        self.answered = None
+        for each in (*self.adapters, self.output):
+            each.clear(self.now_ns(), self.config.target_frame)
 
 
 def main(args=None):

@@ -8,6 +8,7 @@ import time
 
 from hooc_perception.ros.diagnostics import Diagnostics
 from hooc_perception.supervisor.empty_answer import EmptyAnswer
+from hooc_perception.supervisor.pulse import Pulse
 from hooc_perception.supervisor.shared_memory import free_orphans
 from hooc_perception.supervisor.supervisor import (
     CHAIN,
@@ -35,15 +36,19 @@ class Keeper:
 
     A node that dies is started again after a pause that doubles with each death and is
     forgotten after a quiet minute, with the parameters that it had, changes at run time
-    included. Each death is counted and said on the log and in /diagnostics.
+    included. A node that lives but does not answer any more is ended and counts as dead. Each
+    death is counted and said on the log and in /diagnostics.
 
     :param supervisor: an entered Supervisor whose nodes are up.
     :param pause_s: before the first restart.
     :param longest_s: the pause never grows beyond this.
     :param quiet_s: a node that has lived so long is regarded as healthy again.
+    :param hung_s: a node that has not answered for so long hangs: far longer than any frame set
+        takes. 0 = never.
     """
 
-    def __init__(self, supervisor, pause_s=1.0, longest_s=30.0, quiet_s=60.0, frame='table'):
+    def __init__(self, supervisor, pause_s=1.0, longest_s=30.0, quiet_s=60.0, frame='table',
+                 hung_s=120.0):
         """Watch from now on."""
         self._supervisor, self._node, self._frame = supervisor, supervisor.node, frame
         self._pause_s, self._longest_s, self._quiet_s = pause_s, longest_s, quiet_s
@@ -52,6 +57,7 @@ class Keeper:
         self._recent = Counter()        # name -> deaths since it was last healthy
         self._alive_since = dict.fromkeys(supervisor.names, time.monotonic())
         self._revivals = {}             # name -> generator that brings it back
+        self._pulses = {name: Pulse(supervisor, name, hung_s) for name in supervisor.names}
         self._empty, self._empty_until, self._said = None, 0.0, 0.0
         self._reset = self._node.create_client(Trigger, 'reset')
         self._node.create_subscription(ParameterEvent, '/parameter_events', self._on_event, 100)
@@ -59,6 +65,9 @@ class Keeper:
     def spin(self, seconds=0.05):
         """Serve callbacks for a moment, then do what is due for those who have died."""
         self._supervisor.spin_unchecked(seconds)
+        for name, pulse in self._pulses.items():
+            if name not in self._revivals and not pulse.beats():
+                self._supervisor.processes[name].kill()
         for name in self._supervisor.dead():
             if name not in self._revivals:
                 self._revivals[name] = self._revive(name)
@@ -87,6 +96,7 @@ class Keeper:
             refused = yield from self._bring_up(name)
             if refused is None:
                 self._alive_since[name] = time.monotonic()
+                self._pulses[name].start_anew()
                 self._node.get_logger().info(
                     f'{name} is active again, {time.monotonic() - began:.1f} s after its start')
                 return
@@ -107,9 +117,13 @@ class Keeper:
         pause = self._pause_of(name)
         tell = self.diagnostics.error if self._recent[name] >= MANY_DEATHS else (
             self.diagnostics.warn)
-        tell(name, 'died', f'it ended unexpectedly ({_manner(process.exit_code())}; last words: '
+        silent_s = self._pulses[name].silent_s
+        how = ('it ended unexpectedly' if not silent_s else
+               f'it did not answer for {silent_s:.0f} s and was ended')
+        tell(name, 'died', f'{how} ({_manner(process.exit_code(), silent_s)}last words: '
              f'{process.last_words()}); it is started again in {pause:g} s, death '
              f'{self.deaths[name]} since the start')
+        self._pulses[name].start_anew()
         self._take_back(name)
         return pause
 
@@ -214,13 +228,15 @@ def _plain(value):
     return list(value) if hasattr(value, '__iter__') and not isinstance(value, str) else value
 
 
-def _manner(exit_code):
-    """Return in words how a process ended."""
+def _manner(exit_code, silent_s):
+    """Return in words how a process ended, nothing where the keeper ended it."""
+    if silent_s:
+        return ''
     if exit_code >= 0:
-        return f'exit code {exit_code}'
+        return f'exit code {exit_code}; '
     try:
         name = signal.Signals(-exit_code).name
     except ValueError:
         name = f'signal {-exit_code}'
     hint = '; was memory short?' if -exit_code == signal.SIGKILL else ''
-    return f'killed by {name}{hint}'
+    return f'killed by {name}{hint}; '

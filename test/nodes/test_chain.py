@@ -364,6 +364,22 @@ def test_enable_and_reset(chain):
     assert json.loads(heard['objects/labels'][-1].data)['objects'] == {}
 
 
+def test_an_answer_that_nothing_follows_is_taken_back(chain):
+    from rclpy.parameter import Parameter
+    stages, bench, send = chain
+    heard = heard_answer(bench, stages)
+    parsing = bench.chain[3]
+    parsing.set_parameters([Parameter('keep_answer_s', value=1.5)])
+    send()
+    assert bench.spin(lambda: heard['objects/poses'] and heard['objects/poses'][-1].poses)
+    assert bench.spin(lambda: heard['objects/poses'][-1].poses == [])
+    assert heard['objects/can/poses'][-1].poses == []
+    assert bench.reasons(parsing)['parse'][0] == 'answer_expired'
+    n = len(heard['objects/poses'])
+    bench.rest(1.2)
+    assert len(heard['objects/poses']) == n, 'it is taken back once'
+
+
 def test_a_refusing_stage_says_why_and_the_next_set_is_parsed(chain):
     stages, bench, send = chain
     heard = heard_answer(bench, stages)

@@ -78,6 +78,27 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
         assert until(lambda: 'hooc_supervisor: parsing_node' in latest)
 
 
+def test_a_node_that_hangs_is_ended_and_comes_back(own_environment):
+    with Supervisor((REPLAY,), {REPLAY: {'bag': 'none'}}, isolated=True) as supervisor:
+        keeper = Keeper(supervisor, pause_s=0.1, hung_s=2.0)
+        first = supervisor.processes[REPLAY].pid
+
+        def spin_until(condition):
+            deadline = time.monotonic() + 30
+            while not condition() and time.monotonic() < deadline:
+                keeper.spin(0.02)
+            assert condition()
+
+        started = time.monotonic()
+        spin_until(lambda: time.monotonic() - started > 4.0)
+        assert not keeper.deaths, 'a node that answers is left alone'
+        os.kill(first, signal.SIGSTOP)
+        spin_until(lambda: supervisor.processes[REPLAY].pid != first)
+        assert keeper.deaths[REPLAY] == 1
+        (status,) = (s for s in keeper.diagnostics.statuses() if s.name.endswith(REPLAY))
+        assert 'did not answer for 2 s' in status.message and 'memory' not in status.message
+
+
 def test_a_node_that_keeps_dying_is_tried_less_and_less_often(own_environment, tmp_path,
                                                               monkeypatch):
     monkeypatch.setenv('PYTHONPATH', str(tmp_path))

@@ -20,7 +20,7 @@ pytest.importorskip('rclpy')
 CHAIN = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node')
 GIVEN = {'model': '~/m', 'profile': 'fast', 'cameras': '[left, right]', 'target_frame': 'table',
          'seed': '3', 'use_sim_time': 'True', 'params_file': '/p.yaml', 'namespace': 'hooc',
-         'autostart': 'true'}
+         'autostart': 'true', 'respawn': 'true'}
 
 
 def recorder(kind, required=(), optional=(), positional=0):
@@ -53,6 +53,8 @@ def launch(monkeypatch, repository):
             'OpaqueFunction': recorder('OpaqueFunction', ('function',), ('args', 'kwargs')),
             'RegisterEventHandler': recorder('RegisterEventHandler', (), action, 1)},
         'launch.conditions': {'IfCondition': recorder('IfCondition', positional=1)},
+        'launch.event_handlers': {'OnProcessStart': recorder(
+            'OnProcessStart', (), ('target_action', 'on_start'))},
         'launch.events': {'matches_action': lambda action: lambda other: other is action},
         'launch.substitutions': {'LaunchConfiguration': configuration},
         'launch.launch_description_sources': {'PythonLaunchDescriptionSource': recorder(
@@ -60,7 +62,8 @@ def launch(monkeypatch, repository):
         'launch_ros': {},
         'launch_ros.actions': {'LifecycleNode': recorder(
             'LifecycleNode', ('name', 'namespace'),
-            ('package', 'executable', 'parameters', 'output', 'remappings', *action))},
+            ('package', 'executable', 'parameters', 'output', 'remappings', 'respawn',
+             'respawn_delay', *action))},
         'launch_ros.event_handlers': {'OnStateTransition': recorder(
             'OnStateTransition', ('entities',),
             ('target_lifecycle_node', 'transition', 'start_state', 'goal_state', 'matcher'))},
@@ -94,6 +97,10 @@ def order_of(actions, node):
     for action in actions:
         if action is node:
             kinds.append('node')
+        elif action.kind == 'RegisterEventHandler' and action.args[0].kind == 'OnProcessStart':
+            if action.args[0].target_action is node:
+                assert order_of(action.args[0].on_start, node) == ['configure']
+                kinds.append('configure')
         elif action.kind == 'RegisterEventHandler' and (
                 action.args[0].target_lifecycle_node is node):
             assert (action.args[0].start_state, action.args[0].goal_state) == (
@@ -115,8 +122,9 @@ def test_perception_starts_the_chain(launch, repository):
     nodes = [a for a in actions if a.kind == 'LifecycleNode']
     assert tuple(n.name for n in nodes) == CHAIN == tuple(n.executable for n in nodes)
     for node in nodes:
-        kinds = order_of(actions, node)
-        assert kinds.index('handler') < kinds.index('configure') and 'node' in kinds
+        # A handler hears only what happens after it was registered.
+        assert order_of(actions, node) == ['handler', 'configure', 'node']
+        assert node.respawn.perform(None) == 'true'
         params, own = node.parameters
         assert params == '/p.yaml' and own['cameras'] == ['left', 'right']
         assert own['seed'] == 3 and own['use_sim_time'] is True and own['model'].startswith('/')

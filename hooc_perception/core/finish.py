@@ -16,16 +16,17 @@ WORTH_SLOPE, WORTH_OFFSET = 0.88, -4.04
 PIXEL_M2 = (1.1 / 365) ** 2
 
 
-def finished(parsed, observation, models, config, judged=False):
+def finished(parsed, observation, models, config, verifier=None):
     """
     Return the ParsedScene with calibrated scores and canonical orientations.
 
     The paper's energy says nothing in pixels: its scores stay as they are.
 
     :param config: ParseConfig.
-    :param judged: whether the scores are a verifier's, and calibrated already.
+    :param verifier: Verifier of the model, whose scores are calibrated already.
     """
     objects = canonical_objects(parsed.objects, models)
+    judged = verifier is not None and config.verify_weight > 0
     if config.search == 'joint' and len(objects) and not judged:
         worth = np.maximum(parsed.energy_delta * pixel_areas(objects, observation), 1e-3)
         odds = np.exp(WORTH_SLOPE * np.log(worth) + WORTH_OFFSET)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import back_project, canonical_pose, rays
 from hooc_perception.core.kernels.undistort import rectify_nearest
+from hooc_perception.core.table import uneven_table
 from hooc_perception.core.types import Observation, ObservedView, RectifiedView
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -36,7 +37,11 @@ class ObserveConfig(Config):
     foreground_sigma: float = param(
         3.0, 'A point is foreground from this multiple of the table noise on.', '', 1.0, 10.0)
     min_foreground_m: float = param(
-        0.005, 'Smallest height above the table that is foreground.', 'm', 0.001, 0.05)
+        0.004, 'Smallest height above the table that is foreground.', 'm', 0.001, 0.05)
+    uneven_m: float = param(
+        0.12, 'Sensors bend a flat table by some millimetres, over lengths from this on; what '
+        'stands out from its surroundings by less than the whole bend is foreground all the '
+        'same. 0 = the table is taken for flat.', 'm', 0.0, 1.0)
 
 
 def rectify(view, config=ObserveConfig()):
@@ -139,8 +144,14 @@ def _against_table(view, sigma, noise_m, config):
     behind = seen & (depth > plane + 0.05)
     table = np.isfinite(plane) & inside & ~_opened(behind)
     near = np.hypot(points[..., 0], points[..., 1]) < config.workspace_radius_m
-    foreground = (seen & near & (points[..., 2] > threshold)
-                  & (points[..., 2] < config.max_height_m))
+    height = points[..., 2]
+    above = height > threshold
+    if config.uneven_m > 0:
+        flat = seen & inside & (np.abs(height) < config.table_band_m)
+        pixels = config.uneven_m * camera.K[0, 0] / np.median(depth[flat]) if flat.any() else 0
+        base, local = uneven_table(height, flat & ~above, pixels)
+        above |= height - base > max(config.min_foreground_m, config.foreground_sigma * local)
+    foreground = seen & near & above & (height < config.max_height_m)
     foreground &= ~_tiny(foreground)
     # Off the table nothing is known of the empty scene but what is measured there.
     background = np.where(table, plane, np.where(seen & ~foreground, depth, np.nan))

@@ -76,9 +76,10 @@ class OverlapTerm:
 
     :param objects: Candidates; class id c is models[c - 1].
     :param count: samples of each interior, a multiple of 64.
+    :param rivals: objects of one category exclude each other: leave their overlap out.
     """
 
-    def __init__(self, objects, models, count=SAMPLES):
+    def __init__(self, objects, models, count=SAMPLES, rivals=False):
         """Compare all pairs whose bounding boxes meet; start from the empty subset."""
         self.n = n = len(objects)
         self._count = count
@@ -92,7 +93,7 @@ class OverlapTerm:
         R = (Rotation.from_quat(objects.rotation_xyzw).as_matrix() if n
              else np.zeros((0, 3, 3)))
         size = np.maximum(objects.size.astype(np.float64), 1e-9)
-        pairs = _meeting_pairs(R, objects.translation, size)
+        pairs = _meeting_pairs(R, objects.translation, size, row if rivals else np.arange(n))
         bits = np.zeros((len(pairs), count // 64), np.uint64)
         kernels.sample_bits(pairs, row.astype(np.int32), R, objects.translation, size, samples,
                             grids, bits)
@@ -150,14 +151,18 @@ class OverlapTerm:
         return float(self.shares(mask).sum())
 
 
-def _meeting_pairs(R, translation, size):
-    """Return (m, 2) int32 ordered pairs, both directions, whose world boxes and spheres meet."""
+def _meeting_pairs(R, translation, size, group):
+    """
+    Return (m, 2) int32 ordered pairs, both directions, whose world boxes and spheres meet.
+
+    Those of the same group (n,) are left out.
+    """
     half = 0.5 * np.einsum('nij,nj->ni', np.abs(R), size)
     radius = 0.5 * np.linalg.norm(size, axis=1)
     apart = np.abs(translation[:, None] - translation[None])
     meet = ((apart < half[:, None] + half[None]).all(-1)
             & (np.linalg.norm(apart, axis=-1) < radius[:, None] + radius[None]))
-    np.fill_diagonal(meet, False)
+    meet &= group[:, None] != group[None]
     return np.argwhere(meet).astype(np.int32)
 
 

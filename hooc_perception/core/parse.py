@@ -17,7 +17,9 @@ from hooc_perception.core.genetic import genetic_search, GeneticConfig
 from hooc_perception.core.joint import JointEnergy
 from hooc_perception.core.kernels import explain as stat
 from hooc_perception.core.local_search import local_search, LocalSearchConfig
+from hooc_perception.core.merge import merged_pairs
 from hooc_perception.core.propose import candidates_of
+from hooc_perception.core.symmetry import half_turns
 from hooc_perception.core.types import Candidates, ParsedScene
 from hooc_perception.core.verify import features
 from hooc_perception.core.workspace import workspace_of
@@ -31,10 +33,14 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
     search: str = param('joint', 'how the subset is found', choices=('joint', 'genetic'))
     patience: int = param(8, 'kicks in a row without a gain after which the search has '
                           'converged', low=0)
+    kept: int = param(12, 'joint: candidates a category, beside the chosen, that go on to the next '
+                      'round', low=1)
     finalists: int = param(8, 'joint: candidates a category, beside the chosen, that are looked '
                            'at in full resolution', low=1)
     rounds: int = param(2, 'joint: rounds of refinement and re-proposal', low=0)
     polish_steps: int = param(20, 'joint: steps of refinement of a chosen object', low=0)
+    turn_steps: int = param(10, 'joint: steps of refinement of a chosen object after half a turn '
+                            'about each of its axes; 0 = no such turns', low=0)
     tolerance_m: float = param(0.03, 'joint: depth residual as bad as no explanation', 'm',
                                0.002, 0.5)
     normal_weight: float = param(0.4, 'joint: cost of a perpendicular normal', '', 0.0, 2.0)
@@ -47,7 +53,8 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
     base_cost: float = param(40.0, 'joint: cost of an object that no verifier has judged', 'px',
                              0.0, 1000.0)
     verify_weight: float = param(80.0, 'joint: worth of the odds that the verifier gives a '
-                                 'candidate, each unit of their logarithm', 'px', 0.0, 1000.0)
+                                 'candidate, each unit of their logarithm; 0 = the energy '
+                                 'decides alone', 'px', 0.0, 1000.0)
     missing_against_false: float = param(2.0, 'joint: how much worse it is to miss an object than '
                                          'to report a false one', '', 0.01, 100.0)
     least_cost: float = param(40.0, 'joint: what an object costs at least, however probable, '
@@ -98,7 +105,7 @@ def _joint(observation, probabilities, pool, models, config, rng, max_instances,
     state, found, considered = search_scene(observation, probabilities, pool, models, config,
                                             rng, max_instances, more, late)
     score = None
-    if verifier is not None and len(state.pool):
+    if verifier is not None and config.verify_weight and len(state.pool):
         score = verifier.probability(features(state.evidence, state.pool, state.stats,
                                               state.lists, models, state.weighed()))
         found = state.judged(score).search(rng, late)
@@ -117,16 +124,20 @@ def search_scene(observation, probabilities, pool, models, config, rng, max_inst
     :return: (Search at its optimum, SearchResult, Candidates that were considered before).
     """
     space = workspace_of(observation, probabilities, models)
-    state = Search(space.coarse, models, config, max_instances).with_more(pool)
+    state, considered = Search(space.coarse, models, config, max_instances).with_more(pool), pool
     for turn in range(config.rounds + 1):
         found = state.search(rng, late)
-        if turn == config.rounds or not found.converged or late():
+        state.merged(config.polish_steps, rng)
+        if not found.converged or late():
             break
-        new = state.polished(config.polish_steps, rng)
-        if more is not None and not late():
+        last = turn == config.rounds
+        new = state.polished(config.turn_steps if last else config.polish_steps, rng, last)
+        if more is not None and not last and not late():
             new = new.extended(more(state.pool.take(state.mask), turn + 1))
-        state = state.with_more(new)
-    considered = state.pool
+        considered = considered.extended(new)
+        state = state.take(state.in_the_running(config.kept)).with_more(new)
+    if found.converged and not late():
+        found = state.search(rng, late)
     state = state.on(space.evidence, state.in_the_running(config.finalists))
     if found.converged and not late():
         found = state.with_more(state.polished(config.polish_steps, rng)).search(rng, late)
@@ -161,17 +172,50 @@ class Search:
         self.mask = found.mask
         return found
 
-    def polished(self, steps, rng):
-        """Return refined copies of the chosen; both stay, the search decides which fit."""
+    def polished(self, steps, rng, turned=False):
+        """
+        Return refined copies of the chosen; both stay, the search decides which fit.
+
+        :param turned: start them half a turn away, about each axis where that is visible: no
+            step of a refinement is so long.
+        """
         chosen = np.flatnonzero(self.mask)
+        start, context = self.pool.take(chosen), self.evidence.compose(chosen, self.lists)
+        if turned:
+            start, row = half_turns(start, self.models)
+            chosen = chosen[row]
         if not len(chosen) or not steps:
             return Candidates.empty()
+        H = self._refined(hypotheses_of(start, self.models), start.category, chosen, context,
+                          steps, rng)
+        return candidates_of(H, start.category, start.score, self.models)
+
+    def merged(self, steps, rng):
+        """Let one object take the place of two of its kind where that costs less; return self."""
+        chosen = np.flatnonzero(self.mask)
+        start, pairs = merged_pairs(self.pool.take(chosen), self.models)
+        if not len(start) or not steps:
+            return self
+        H = hypotheses_of(start, self.models)
+        for k, pair in enumerate(chosen[pairs]):
+            others = self.evidence.compose(np.setdiff1d(chosen, pair), self.lists)
+            H[k] = self._refined(H[k:k + 1], start.category[k:k + 1], [-1], others, steps, rng)[0]
+        first = len(self.pool)
+        self.with_more(candidates_of(H, start.category, start.score, self.models))
+        energy = self.weighed()
+        for k, pair in enumerate(chosen[pairs]):
+            mask = self.mask.copy()
+            mask[pair], mask[first + k] = False, True
+            if self.mask[pair].all() and energy.evaluate(mask) < energy.value:
+                self.mask = mask
+                energy.reset(mask)
+        return self
+
+    def _refined(self, hypotheses, category, me, context, steps, rng):
+        """Return hypotheses (m, 10), each refined in its context; see Evidence.polish."""
         c = self.config
-        H = self.evidence.polish(
-            hypotheses_of(self.pool.take(chosen), self.models), self.pool.category[chosen],
-            chosen, self.evidence.compose(chosen, self.lists), _weights(c), c.complexity,
-            c.size_prior, steps, (0.005, 0.06, 0.04), rng)
-        return candidates_of(H, self.pool.category[chosen], self.pool.score[chosen], self.models)
+        return self.evidence.polish(hypotheses, category, me, context, _weights(c), c.complexity,
+                                    c.size_prior, steps, (0.005, 0.06, 0.04), rng)
 
     def in_the_running(self, most):
         """Return (n,) bool: the chosen and the `most` a category that would cost least to add."""
@@ -181,6 +225,14 @@ class Search:
             mine = np.flatnonzero((self.pool.category == c) & ~self.mask)
             keep[mine[np.argsort(costs[mine], kind='stable')[:most]]] = True
         return keep
+
+    def take(self, rows):
+        """Return the same search with only some rows (n,) bool."""
+        other = Search(self.evidence, self.models, self.config, self.max_instances)
+        other.pool, other.mask, other.stats = (
+            self.pool.take(rows), self.mask[rows], self.stats[rows])
+        other.lists = self.lists.take(np.flatnonzero(rows))
+        return other
 
     def on(self, evidence, rows):
         """Return the same search on another resolution, with only some rows (n,) bool."""

@@ -60,7 +60,7 @@ class Pipeline:
             scene = lap('sigmas', with_sigmas(scene, observation, probabilities, self.models,
                                               p.parse, self.rng('sigmas')))
         return finished(scene, observation, self.models, p.parse,
-                        self.verifier is not None).timed(**seconds)
+                        self.verifier).timed(**seconds)
 
     def more(self, observation, probabilities):
         """Return the re-proposal that `parse` calls each round."""

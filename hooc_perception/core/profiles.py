@@ -39,7 +39,8 @@ def profile(name):
     if name == 'best':
         return Profile()
     if name == 'paper':
-        return Profile('paper', propose=ProposeConfig(method='fragments'),
+        return Profile('paper', observe=ObserveConfig(uneven_m=0.0, min_foreground_m=0.005),
+                       propose=ProposeConfig(method='fragments'),
                        parse=ParseConfig(search='genetic', rounds=0))
     if name == 'fast':
         return Profile('fast',

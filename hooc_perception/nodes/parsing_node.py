@@ -122,7 +122,7 @@ class ParsingNode(StageNode):
                 parsed, observation, probabilities, self.models, self.parameters['parse'],
                 stage_rng(self.config.seed, 'sigmas'))
         parsed = finished(parsed, observation, self.models, self.parameters['parse'],
-                          self.verifier is not None)
+                          self.verifier)
         self.tracker.config = self.config
         ids, objects = self.tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)

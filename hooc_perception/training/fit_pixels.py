@@ -15,6 +15,7 @@ from hooc_perception.core.forest import Forest, quantised
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.kernels import forest_pixels
 from hooc_perception.core.observe import observe
+from hooc_perception.core.profiles import profile
 from hooc_perception.training import fit_kernels
 from joblib import delayed, Parallel
 import numpy as np
@@ -77,7 +78,7 @@ def pool(scenes, n_scenes, n_pixels, config, seed, stage):
     """
     images, parts = None, []
     for s, training in enumerate(scenes):
-        observation = observe(training.views)
+        observation = observe(training.views, profile('paper').observe)
         stack = pixel_forest.depth_stack(observation.views)
         if images is None:
             images = np.zeros((n_scenes, *stack.shape), np.uint16)

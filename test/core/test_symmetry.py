@@ -2,7 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Symmetry groups and the rotation error over them."""
 
-from hooc_perception.core.symmetry import is_ball, rotation_error, symmetry_rotations
+from types import SimpleNamespace
+
+from hooc_perception.core.symmetry import (
+    half_turns,
+    is_ball,
+    rotation_error,
+    symmetry_rotations,
+)
+from hooc_perception.core.types import Candidates
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -63,3 +71,19 @@ def test_ball_has_no_rotation_error():
     assert is_ball((0, 0, 0)) and not is_ball((1, 1, 0))
     assert rotation_error(R_est, R_true, (0, 0, 0)) == 0
     assert rotation_error(R_est, R_true, (1, 1, 1)) > 0.1
+
+
+def test_half_turns_are_those_that_a_symmetry_does_not_hide():
+    cup = SimpleNamespace(symmetry=np.array([1, 1, 0]))         # continuous about z
+    spoon = SimpleNamespace(symmetry=np.array([1, 1, 1]))
+    box = SimpleNamespace(symmetry=np.array([2, 2, 2]))
+    q = Rotation.from_euler('xyz', [[0.3, 0.2, 0.1], [1.0, 0.5, 2.0], [0.1, 0.7, 0.3]]).as_quat()
+    objects = Candidates(np.array([1, 2, 3], np.uint8), np.eye(3), q, np.ones((3, 3)),
+                         np.array([.1, .2, .3], np.float32))
+    turned, rows = half_turns(objects, (cup, spoon, box))
+    assert rows.tolist() == [0, 0, 1, 1, 1] and turned.category.tolist() == [1, 1, 2, 2, 2]
+    np.testing.assert_array_equal(turned.translation, objects.translation[rows])
+    apart = (Rotation.from_quat(turned.rotation_xyzw) * Rotation.from_quat(q[rows]).inv())
+    np.testing.assert_allclose(apart.magnitude(), np.pi, atol=1e-6)
+    none, rows = half_turns(objects.take(np.array([2])), (cup, spoon, box))
+    assert len(none) == 0 and rows.shape == (0,) and none.rotation_xyzw.shape == (0, 4)

@@ -40,10 +40,8 @@ class JointEnergy:
         self._images = Compositor(lists.offsets, lists.pixel, lists.depth, lists.cost,
                                   evidence.cost_none.astype(np.float64), unary=unary,
                                   group=pool.category, max_per_group=max_instances)
-        # A volume need not be known better than the pixels; what the limit keeps from standing
-        # there together need not be compared.
-        self._overlap = OverlapTerm(pool, models, 256 if scale == 1 else 128,
-                                    rivals=max_instances == 1)
+        # A volume need not be known better than the pixels.
+        self._overlap = OverlapTerm(pool, models, 256 if scale == 1 else 128)
         self._weight = config.overlap * scale
 
     @property

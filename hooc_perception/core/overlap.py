@@ -76,10 +76,9 @@ class OverlapTerm:
 
     :param objects: Candidates; class id c is models[c - 1].
     :param count: samples of each interior, a multiple of 64.
-    :param rivals: objects of one category exclude each other: leave their overlap out.
     """
 
-    def __init__(self, objects, models, count=SAMPLES, rivals=False):
+    def __init__(self, objects, models, count=SAMPLES):
         """Compare all pairs whose bounding boxes meet; start from the empty subset."""
         self.n = n = len(objects)
         self._count = count
@@ -93,7 +92,7 @@ class OverlapTerm:
         R = (Rotation.from_quat(objects.rotation_xyzw).as_matrix() if n
              else np.zeros((0, 3, 3)))
         size = np.maximum(objects.size.astype(np.float64), 1e-9)
-        pairs = _meeting_pairs(R, objects.translation, size, row if rivals else np.arange(n))
+        pairs = _meeting_pairs(R, objects.translation, size)
         bits = np.zeros((len(pairs), count // 64), np.uint64)
         kernels.sample_bits(pairs, row.astype(np.int32), R, objects.translation, size, samples,
                             grids, bits)
@@ -151,18 +150,14 @@ class OverlapTerm:
         return float(self.shares(mask).sum())
 
 
-def _meeting_pairs(R, translation, size, group):
-    """
-    Return (m, 2) int32 ordered pairs, both directions, whose world boxes and spheres meet.
-
-    Those of the same group (n,) are left out.
-    """
+def _meeting_pairs(R, translation, size):
+    """Return (m, 2) int32 ordered pairs, both directions, whose world boxes and spheres meet."""
     half = 0.5 * np.einsum('nij,nj->ni', np.abs(R), size)
     radius = 0.5 * np.linalg.norm(size, axis=1)
     apart = np.abs(translation[:, None] - translation[None])
     meet = ((apart < half[:, None] + half[None]).all(-1)
             & (np.linalg.norm(apart, axis=-1) < radius[:, None] + radius[None]))
-    meet &= group[:, None] != group[None]
+    np.fill_diagonal(meet, False)
     return np.argwhere(meet).astype(np.int32)
 
 

@@ -13,10 +13,10 @@ from hooc_perception.core.classify import classify
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.observe import observe
-from hooc_perception.core.parse import search_scene
 from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile as profile_of
 from hooc_perception.core.propose import propose
+from hooc_perception.core.search import search_scene
 from hooc_perception.core.verify import FEATURES, features
 from hooc_perception.synthesis.training_scenes import training_scene
 from hooc_perception.training.fit_forest import fit, FitConfig, quantise, thresholds

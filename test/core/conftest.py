@@ -155,8 +155,8 @@ def empty_desk(things):
 
 @pytest.fixture(scope='session')
 def make_desk(things):
-    """Return a function: Candidates -> desk with them."""
-    return lambda truth, seed=0: desk_with(things, truth, seed)
+    """Return a function: Candidates -> desk with them, of the things or of other models."""
+    return lambda truth, seed=0, models=things: desk_with(models, truth, seed)
 
 
 @pytest.fixture(scope='session')

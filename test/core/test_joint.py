@@ -8,7 +8,8 @@ from hooc_perception.core.evidence import hypotheses_of
 from hooc_perception.core.joint import JointEnergy
 from hooc_perception.core.kernels import explain as stat
 from hooc_perception.core.overlap import union_shares
-from hooc_perception.core.parse import _weights, ParseConfig
+from hooc_perception.core.parse import ParseConfig
+from hooc_perception.core.search import weights_of
 from hooc_perception.core.types import Candidates
 from hooc_perception.core.workspace import workspace_of
 import numpy as np
@@ -21,7 +22,7 @@ def energy_of_pool(desk, pool, config=CONFIG, max_instances=0):
     """Return (JointEnergy over all pixels, stats, lists, evidence)."""
     evidence = workspace_of(desk.observation, desk.probabilities, desk.models).evidence
     stats, lists = evidence.explain(hypotheses_of(pool, desk.models), pool.category,
-                                    _weights(config), lists=True)
+                                    weights_of(config), lists=True)
     return (JointEnergy(evidence, pool, stats, lists, desk.models, config, max_instances), stats,
             lists, evidence)
 

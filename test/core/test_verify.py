@@ -7,7 +7,8 @@ from dataclasses import replace
 from hooc_perception.core.evidence import hypotheses_of
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.joint import JointEnergy
-from hooc_perception.core.parse import _weights, parse, ParseConfig, search_scene
+from hooc_perception.core.parse import parse, ParseConfig
+from hooc_perception.core.search import search_scene, weights_of
 from hooc_perception.core.verify import FEATURES, features, margins, siblings_of, Verifier
 from hooc_perception.core.workspace import workspace_of
 from hooc_perception.errors import HoocError
@@ -40,7 +41,7 @@ def test_margins_are_what_one_exchange_leaves_to_gain(desk):
     pool.translation[3:] += [0.015, 0.0, 0.0]
     evidence = workspace_of(desk.observation, desk.probabilities, desk.models).coarse
     stats, lists = evidence.explain(hypotheses_of(pool, desk.models), pool.category,
-                                    _weights(CONFIG), lists=True)
+                                    weights_of(CONFIG), lists=True)
     energy = JointEnergy(evidence, pool, stats, lists, desk.models, CONFIG, 1)
     start = np.array([True, True, False, False, False, False])
     energy.reset(start)

@@ -47,7 +47,8 @@ def profile(name):
                        propose=ProposeConfig(samples=4000, pool=40, refine_steps=12, polish=8,
                                              polish_steps=6, per_category=8, round_samples=1500,
                                              round_pool=12, round_per_category=3),
-                       parse=ParseConfig(rounds=1, polish_steps=10, patience=3, finalists=4))
+                       parse=ParseConfig(rounds=1, polish_steps=10, turn_steps=6, patience=3,
+                                         finalists=4))
     raise HoocError(f'there is no profile {name!r}; choose one of {", ".join(NAMES)}')
 
 

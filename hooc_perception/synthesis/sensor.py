@@ -76,7 +76,7 @@ def randomised(config, rng):
         m = SensorConfig.__dataclass_fields__[name].metadata
         return min(max(drawn, m['low']), m['high'])
 
-    spreads = {'noise_scale': .35, 'lateral_px': .3, 'drift_m': .8, 'flying': .4,
+    spreads = {'noise_scale': .35, 'lateral_px': .3, 'drift_m': .5, 'flying': .4,
                'edge_dropout': .4, 'random_dropout': .4, 'signal_floor': .4, 'glass_dropout': .3}
     return replace(base, **{name: around(name, s) for name, s in spreads.items()})
 

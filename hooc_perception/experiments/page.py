@@ -14,6 +14,7 @@ import shutil
 
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.tables import to_markdown
+from hooc_perception.evaluation.worst import worst_table
 from hooc_perception.experiments import ablations
 from hooc_perception.experiments import experiment_tables as tables
 from hooc_perception.experiments.plan import Layout, SCORED
@@ -43,6 +44,9 @@ def sections_of(root, sets, records):
         if less:
             out[f'{name} {ablations.ROW}'] = '\n'.join(map(to_markdown, ablations.tables_of(
                 name, scores.get('best'), less, records)))
+        worst = layout.worst / 'worst.json'
+        if worst.exists():
+            out[f'{name} worst'] = to_markdown(worst_table(json.loads(worst.read_text())))
     if records:
         out['steps'] = to_markdown(tables.step_table(records))
     return out
@@ -87,8 +91,9 @@ def write_pages(pages, images, root, sets, records):
             write_atomically(page, text)
             written.append(page)
     for name in sorted(named & set(sets)):
-        for picture in PICTURES:
-            source = Layout(Path(root), name).plots / f'{picture}.png'
+        layout = Layout(Path(root), name)
+        for folder, picture in (*((layout.plots, p) for p in PICTURES), (layout.worst, 'worst')):
+            source = folder / f'{picture}.png'
             if source.exists():
                 written.append(Path(images) / f'results_{name}_{picture}.png')
                 shutil.copyfile(source, written[-1])

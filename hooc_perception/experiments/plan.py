@@ -35,7 +35,11 @@ CODE = {
     'stages': ('hooc_perception.evaluation.as_json', 'hooc_perception.evaluation.evaluate',
                'hooc_perception.evaluation.rerun', _SETS),
     'plots': ('hooc_perception.evaluation.evaluate', 'hooc_perception.evaluation.plots', _SETS),
+    'worst': ('hooc_perception.evaluation.evaluate', 'hooc_perception.evaluation.worst_sheet',
+              _SETS),
 }
+# So many scenes of `best` are drawn.
+WORST = 5
 
 
 @dataclass(frozen=True)
@@ -83,6 +87,11 @@ class Layout:
         return self.root / self.name / 'plots'
 
     @property
+    def worst(self):
+        """Return the folder of the picture and the list of the worst scenes of `best`."""
+        return self.root / self.name / 'worst'
+
+    @property
     def twin(self):
         """Return the folder of the set itself, where it is ours to write."""
         return self.root / self.name / 'set'
@@ -123,6 +132,12 @@ def steps_of(sets, root, rows=ROWS, seed=0, jobs=0):
             out.append(Step(f'{name}/plots', 'plots', 'plots',
                             ('evaluate', path, *files, '--plots', layout.plots),
                             (path, *files), layout.plots))
+            files = (layout.results('best', 'A'), layout.scores('best'))
+            if 'best' in wanted or all(file.exists() for file in files):
+                out.append(Step(f'{name}/worst', 'plots', 'worst',
+                                ('evaluate', path, files[0], '--worst', str(WORST),
+                                 '--stages-from', files[1], '--plots', layout.worst),
+                                (path, *files), layout.worst))
     return out
 
 

@@ -47,7 +47,7 @@ def ran(monkeypatch):
     def execute(step, root):
         names.append(step.name)
         step.output.parent.mkdir(parents=True, exist_ok=True)
-        if step.kind in ('twin', 'train', 'plots'):
+        if step.kind in ('twin', 'train', 'plots', 'worst'):
             step.output.mkdir(exist_ok=True)
             (step.output / 'file').write_text(step.name)
         else:

@@ -37,11 +37,13 @@ def test_ablations_stand_on_the_model_of_best(tmp_path, ran):
     switches = [f'twin/{s.row}/{what}' for s in SWITCHES for what in ('A', 'scores')]
     best = [f'twin/best/{what}' for what in ('train', 'A', 'B', 'scores')]
     # Where there is no such model yet, and nothing to compare with, that row comes first.
-    assert names('ablations') == ['twin/set', *best, *switches, 'twin/plots']
+    assert names('ablations') == ['twin/set', *best, *switches, 'twin/plots',
+                                  'twin/worst']
     assert names('ablations', 'best') == names('ablations')
     steps = plan.steps_of({'twin': None}, tmp_path, ('ablations',))
     quiet(steps, tmp_path)
-    assert names('ablations') == ['twin/set', *switches, 'twin/plots']
+    assert names('ablations') == ['twin/set', *switches, 'twin/plots',
+                                  'twin/worst']
     ran.clear()
     layout = plan.Layout(tmp_path, 'twin')
     layout.results(SWITCHES[3].row, 'A').unlink()

@@ -25,8 +25,8 @@ def test_the_plan_runs_in_its_order(tmp_path, scene_set):
     names = [step.name for step in steps]
     assert len(set(names)) == len(names)
     # Two rows of baselines with two steps, three profiles with four, two steps a switch,
-    # pictures, and the twin.
-    assert len(names) == 2 * (2 * 2 + 3 * 4 + 2 * len(SWITCHES) + 1) + 1
+    # two of pictures, and the twin.
+    assert len(names) == 2 * (2 * 2 + 3 * 4 + 2 * len(SWITCHES) + 2) + 1
 
 
 @pytest.mark.parametrize('sets, rows, word', [
@@ -183,6 +183,33 @@ def test_pages_take_tables_between_their_markers(computed, tmp_path):
     assert pages[0].read_text() == new
 
 
+def test_the_worst_scenes_come_onto_the_page_of_their_set(write_scores, tmp_path):
+    layout = plan.Layout(tmp_path / 'results', 'small')
+    write_scores('best', 0.07, 'A', '--plots', layout.worst, '--worst', '5')
+    docs = tmp_path / 'docs'
+    (docs / 'images').mkdir(parents=True)
+    (docs / 'results.md').write_text('<!-- results: small worst -->\n<!-- end of results -->\n'
+                                     '<!-- results: small -->\n<!-- end of results -->\n')
+    written = page.write_pages([docs / 'results.md'], docs / 'images', layout.root, ['small'], {})
+    text = (docs / 'results.md').read_text()
+    assert cells(text, 'one')[0][1:4] == ['0.50', 'can',
+                                          'found 7 cm away; few pixels (120)']
+    assert [path.name for path in written] == ['results.md', 'results_small_worst.png']
+
+
+def test_the_worst_scenes_are_those_of_best(tmp_path, ran, scene_set):
+    def worst(*rows):
+        steps = plan.steps_of({'small': scene_set}, tmp_path, rows)
+        return [step for step in steps if step.kind == 'worst']
+
+    assert worst('ppf') == []
+    quiet(plan.steps_of({'small': scene_set}, tmp_path, ('best',)), tmp_path)
+    step, = worst('ppf')
+    layout = plan.Layout(tmp_path, 'small')
+    assert {layout.results('best', 'A'), layout.scores('best')} < set(step.inputs)
+    assert ran[-1] == 'small/worst'
+
+
 def test_a_marker_without_an_end_is_named():
     with pytest.raises(HoocError, match='a.md'):
         page.inserted('<!-- results: small -->\n', {}, 'a.md')
@@ -194,7 +221,8 @@ def test_the_pages_of_the_documentation_have_the_markers():
     for path in docs.glob('results*.md'):
         names |= page.inserted(path.read_text(), {}, str(path))[1]
     assert names >= {f'{name}{what}' for name in ('twin', 'dev', 'osd')
-                     for what in ('', ' details', ' ablations')} | {'steps'}
+                     for what in ('', ' details', ' ablations')} | {
+                         'steps', 'twin worst', 'dev worst'}
 
 
 def test_the_command_says_what_is_wrong(tmp_path, capsys):

@@ -8,7 +8,7 @@ RESULTS ?= results
 SETS ?= twin
 DEV ?=
 OSD ?=
-ROWS ?= paper best fast fpfh ppf
+ROWS ?= paper best fast fpfh ppf ablations
 KEEP ?=
 FORCE ?=
 JOBS ?= 0
@@ -20,7 +20,8 @@ help:
 	@echo 'make test    set up if need be, then run every test (PYTEST_ARGS="-k name" for some)'
 	@echo 'make setup   only set up'
 	@echo 'make results recompute the tables of docs/results.md: DEV=folder OSD=folder for more sets,'
-	@echo '             ROWS="best fast", KEEP="paper fpfh ppf", FORCE="best", RESULTS=folder, JOBS=1'
+	@echo '             ROWS="best fast ablations", KEEP="paper fpfh ppf", FORCE="best", RESULTS=folder,'
+	@echo '             JOBS=1'
 	@echo 'make bundle  make the bundled scene and model again'
 	@echo 'make lint    check the style'
 	@echo 'make lock    resolve requirements.in again (PYTHONS="python3.11 python3.12")'

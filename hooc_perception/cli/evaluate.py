@@ -38,6 +38,12 @@ def add_arguments(parser):
     parser.add_argument('--json', metavar='FILE', help='write every score as JSON')
     parser.add_argument('--markdown', metavar='FILE', help='write the tables as Markdown')
     parser.add_argument('--plots', metavar='DIR', help='write pictures of the scores (PNG)')
+    parser.add_argument('--worst', metavar='N', type=int, default=0,
+                        help='draw the N scenes of the (first) results of which least was '
+                        'localized into --plots, and say why: worst.png, worst.json, worst.md')
+    parser.add_argument('--stages-from', metavar='SCORES.json',
+                        help='scores of an earlier --stages --json, so that --worst knows what '
+                        'candidates there were')
     parser.add_argument('--bop-csv', metavar='FILE',
                         help="write the (first) results in BOP's CSV format")
     executor_option.add_argument(parser)
@@ -53,6 +59,11 @@ def run(args):
     if args.stages and not args.model:
         raise HoocError('--stages runs the chain again and needs a trained model; '
                         'give its folder with --model')
+    if args.worst < 0 or args.worst and not args.plots:
+        raise HoocError('--worst draws pictures of that many scenes; give a number from 1 on, '
+                        'and the folder for them with --plots')
+    if args.stages_from and not args.worst:
+        raise HoocError('--stages-from serves --worst alone; say how many scenes that shall draw')
     folder = load_model_folder(args.model) if args.model else None
     scene_set = load_scene_set(args.set).selected(args.scene)
     contents = [load_results(path) for path in args.results]
@@ -65,6 +76,9 @@ def run(args):
     evaluations = [evaluate_results(scene_set, content, models, label,
                                     visibility if args.bop else None)
                    for label, content in zip(labels, contents)]
+    if args.worst and not (evaluations and evaluations[0].scores):
+        raise HoocError('--worst needs results of scenes with true poses; name a results file of '
+                        'such a set')
     truth_energy, stages = {}, {}
     if folder:
         from hooc_perception.evaluation.rerun import rerun
@@ -75,6 +89,8 @@ def run(args):
     if args.visibility or not contents:
         tables = [*_visibility_tables(visibility), *tables]
     _write(args, evaluations, contents, tables, scene_set, visibility, truth_energy, stages)
+    if args.worst:
+        _draw_worst(args, scene_set, evaluations, models, stages)
     return 0
 
 
@@ -153,6 +169,20 @@ def _write(args, evaluations, contents, tables, scene_set, visibility, truth_ene
             raise HoocError('--bop-csv needs a results file to write; name one')
         from hooc_perception.evaluation.bop_csv import write_bop_csv
         write_bop_csv(args.bop_csv, contents[0], scene_set)
+
+
+def _draw_worst(args, scene_set, evaluations, models, stages):
+    """Draw the worst scenes of the first results and print why they are."""
+    from hooc_perception.evaluation import worst
+    from hooc_perception.evaluation.tables import to_text
+    from hooc_perception.evaluation.worst_sheet import write_worst
+
+    pools = (worst.read_pools(args.stages_from) if args.stages_from
+             else worst.pools_of(stages))
+    label = evaluations[0].label
+    scenes = worst.worst_scenes(scene_set, evaluations[0], models, args.worst, pools)
+    print('\n' + to_text(worst.worst_table(worst.worst_json(label, scenes))))
+    write_worst(args.plots, label, scenes, models)
 
 
 def _file(path):

@@ -4,6 +4,7 @@
 
 from hooc_perception.evaluation import paper
 from hooc_perception.evaluation.tables import Table
+from hooc_perception.experiments import ablations
 import numpy as np
 
 HOOC = 'the paper, on HOOC'
@@ -271,12 +272,21 @@ def mask_scene_table(scores):
 
 
 def step_table(records):
-    """Return what every step took, and the state of the code that ran."""
-    rows = [(name, f'{r.cpu_s:.0f}', f'{r.wall_s:.0f}', f'{r.peak_mb:.0f}', r.commit or None)
-            for name, r in sorted(records.items())]
+    """Return what every step took, the switches of a set as one, and the code that ran."""
+    groups = {}
+    for name, record in sorted(records.items()):
+        head, row, *rest = name.split('/')
+        if row == ablations.ROW:
+            name = f'{head}/{row}'
+        groups.setdefault(name, []).append(record)
+    rows = [(name if len(rs) == 1 else f'{name} ({len(rs)})', f'{sum(r.cpu_s for r in rs):.0f}',
+             f'{sum(r.wall_s for r in rs):.0f}', f'{max(r.peak_mb for r in rs):.0f}',
+             ' '.join(dict.fromkeys(r.commit for r in rs if r.commit)) or None)
+            for name, rs in groups.items()]
     total = sum(r.cpu_s for r in records.values())
     rows.append(('all', f'{total:.0f}', None, None, None))
     return Table('What it took', ('step', 'CPU s', 's', 'MB', 'code'), tuple(rows),
                  ('CPU s: processor seconds of the process and its workers; s: seconds passed, '
                   'on a machine that may have had other work; MB: most memory; code: the commit, '
-                  '+ where files were changed since.',), (len(rows) - 1,))
+                  '+ where files were changed since. (n): so many steps together.',),
+                 (len(rows) - 1,))

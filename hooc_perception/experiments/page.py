@@ -14,8 +14,10 @@ import shutil
 
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.tables import to_markdown
+from hooc_perception.evaluation.worst import worst_table
+from hooc_perception.experiments import ablations
 from hooc_perception.experiments import experiment_tables as tables
-from hooc_perception.experiments.plan import Layout, ROWS
+from hooc_perception.experiments.plan import Layout, SCORED
 from hooc_perception.scenes.files import write_atomically
 
 END = '<!-- end of results -->'
@@ -33,16 +35,27 @@ def sections_of(root, sets, records):
     out = {}
     for name in sets:
         layout = Layout(Path(root), name)
-        scores = {row: json.loads(layout.scores(row).read_text())
-                  for row in ROWS if layout.scores(row).exists()}
-        if not scores:
-            continue
-        summary, details = tables.of_set(name, scores, records)
-        out[name] = '\n'.join(map(to_markdown, summary))
-        out[f'{name} details'] = '\n'.join(map(to_markdown, details))
+        scores = _scores(layout, SCORED)
+        if scores:
+            summary, details = tables.of_set(name, scores, records)
+            out[name] = '\n'.join(map(to_markdown, summary))
+            out[f'{name} details'] = '\n'.join(map(to_markdown, details))
+        less = _scores(layout, [switch.row for switch in ablations.SWITCHES])
+        if less:
+            out[f'{name} {ablations.ROW}'] = '\n'.join(map(to_markdown, ablations.tables_of(
+                name, scores.get('best'), less, records)))
+        worst = layout.worst / 'worst.json'
+        if worst.exists():
+            out[f'{name} worst'] = to_markdown(worst_table(json.loads(worst.read_text())))
     if records:
         out['steps'] = to_markdown(tables.step_table(records))
     return out
+
+
+def _scores(layout, rows):
+    """Return {row: content of its scores file} of the rows that have one."""
+    return {row: json.loads(layout.scores(row).read_text())
+            for row in rows if layout.scores(row).exists()}
 
 
 def inserted(text, sections, where='the page'):
@@ -78,8 +91,9 @@ def write_pages(pages, images, root, sets, records):
             write_atomically(page, text)
             written.append(page)
     for name in sorted(named & set(sets)):
-        for picture in PICTURES:
-            source = Layout(Path(root), name).plots / f'{picture}.png'
+        layout = Layout(Path(root), name)
+        for folder, picture in (*((layout.plots, p) for p in PICTURES), (layout.worst, 'worst')):
+            source = folder / f'{picture}.png'
             if source.exists():
                 written.append(Path(images) / f'results_{name}_{picture}.png')
                 shutil.copyfile(source, written[-1])

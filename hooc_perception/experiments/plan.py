@@ -4,18 +4,22 @@
 What `make results` runs: a list of `hooc` commands with what they read and write.
 
 A *row* is what a table has a row for: a profile or a baseline. Every row of every set is its
-own chain of steps, so that one can be computed again without the others.
+own chain of steps, so that one can be computed again without the others. The row `ablations` is
+a table of its own: the profile `best`, with its model, less one part at a time.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
+from hooc_perception.experiments.ablations import ROW as ABLATIONS
+from hooc_perception.experiments.ablations import SWITCHES
 from hooc_perception.scenes.scene_set import load_scene_set
 
 PROFILES = ('paper', 'best', 'fast')
 BASELINES = ('fpfh', 'ppf')
-ROWS = PROFILES + BASELINES
+SCORED = PROFILES + BASELINES
+ROWS = SCORED + (ABLATIONS,)
 
 # Modules whose code, with all that they import, a kind of step runs.
 _SETS = 'hooc_perception.scenes.scene_set'
@@ -31,7 +35,11 @@ CODE = {
     'stages': ('hooc_perception.evaluation.as_json', 'hooc_perception.evaluation.evaluate',
                'hooc_perception.evaluation.rerun', _SETS),
     'plots': ('hooc_perception.evaluation.evaluate', 'hooc_perception.evaluation.plots', _SETS),
+    'worst': ('hooc_perception.evaluation.evaluate', 'hooc_perception.evaluation.worst_sheet',
+              _SETS),
 }
+# So many scenes of `best` are drawn.
+WORST = 5
 
 
 @dataclass(frozen=True)
@@ -79,6 +87,11 @@ class Layout:
         return self.root / self.name / 'plots'
 
     @property
+    def worst(self):
+        """Return the folder of the picture and the list of the worst scenes of `best`."""
+        return self.root / self.name / 'worst'
+
+    @property
     def twin(self):
         """Return the folder of the set itself, where it is ours to write."""
         return self.root / self.name / 'set'
@@ -109,14 +122,22 @@ def steps_of(sets, root, rows=ROWS, seed=0, jobs=0):
         else:
             path = Path(path)
             posed = any(scene.truth for scene in load_scene_set(path).scenes)
-        for row in rows:
-            out += _row(layout, path, row, posed, str(seed), str(jobs))
+        wanted = _with_best(layout, rows)
+        for row in wanted:
+            out += (_ablations(layout, path, str(seed)) if row == ABLATIONS
+                    else _row(layout, path, row, posed, str(seed), str(jobs)))
         if posed:
-            files = tuple(layout.results(row, 'A') for row in ROWS
-                          if row in rows or layout.results(row, 'A').exists())
+            files = tuple(layout.results(row, 'A') for row in SCORED
+                          if row in wanted or layout.results(row, 'A').exists())
             out.append(Step(f'{name}/plots', 'plots', 'plots',
                             ('evaluate', path, *files, '--plots', layout.plots),
                             (path, *files), layout.plots))
+            files = (layout.results('best', 'A'), layout.scores('best'))
+            if 'best' in wanted or all(file.exists() for file in files):
+                out.append(Step(f'{name}/worst', 'plots', 'worst',
+                                ('evaluate', path, files[0], '--worst', str(WORST),
+                                 '--stages-from', files[1], '--plots', layout.worst),
+                                (path, *files), layout.worst))
     return out
 
 
@@ -146,4 +167,25 @@ def _row(layout, path, row, posed, seed, jobs):
     out.append(step('scores', 'stages' if posed else 'scores',
                     ['evaluate', path, *answers, *score],
                     [path, *answers, *([model] if posed else [])], layout.scores(row)))
+    return out
+
+
+def _with_best(layout, rows):
+    """Return the rows in the order of ROWS, with `best` where its ablations lack it."""
+    needed = () if layout.model('best').exists() and layout.scores('best').exists() else ('best',)
+    return [row for row in ROWS if row in rows or ABLATIONS in rows and row in needed]
+
+
+def _ablations(layout, path, seed):
+    """Return the steps of the row `ablations` of a set: two for every switch."""
+    out, model = [], layout.model('best')
+    for switch in SWITCHES:
+        answer, scores = layout.results(switch.row, 'A'), layout.scores(switch.row)
+        changed = [text for p in switch.parameters for text in ('--set-parameter', p)]
+        name = f'{layout.name}/{switch.row}'
+        out.append(Step(f'{name}/A', ABLATIONS, 'parse',
+                        ('parse', path, '--model', model, '--profile', 'best', '--seed', seed,
+                         *changed, '--out', answer), (path, model), answer))
+        out.append(Step(f'{name}/scores', ABLATIONS, 'scores',
+                        ('evaluate', path, answer, '--json', scores), (path, answer), scores))
     return out

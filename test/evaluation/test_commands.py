@@ -64,7 +64,8 @@ def test_without_results_only_the_visibility_is_told(tiny_path, capsys):
 
 @pytest.mark.parametrize('arguments, word', [
     (['--scene', 'elsewhere'], 'elsewhere'), (['--stages'], '--model'),
-    (['--model', 'no/such/folder'], 'no/such/folder')])
+    (['--model', 'no/such/folder'], 'no/such/folder'), (['--worst', '3'], '--plots'),
+    (['--worst', '-1', '--plots', 'p'], '--worst'), (['--stages-from', 'a.json'], '--worst')])
 def test_evaluate_says_what_is_wrong(tiny_path, truth_file, capsys, arguments, word):
     assert main(['evaluate', str(tiny_path), str(truth_file), *arguments]) == 1
     error = capsys.readouterr().err

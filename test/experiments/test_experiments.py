@@ -2,64 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which steps run again and which do not, and what the pages show."""
 
-import json
 from pathlib import Path
 
-from hooc_perception.cli.main import main as hooc
-from hooc_perception.core.render import render_depth
-from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.experiments import fingerprint, page, plan, run
 from hooc_perception.experiments.__main__ import main
-from hooc_perception.scenes.scene_set import NewScene, TrueObject, write_scene_set
-import numpy as np
+from hooc_perception.experiments.ablations import SWITCHES
 import pytest
-import trimesh
-
-MESHES = {'box': trimesh.creation.box((0.16, 0.10, 0.06)),
-          'can': trimesh.creation.cylinder(0.03, 0.12, sections=24)}
-TRUTH = (TrueObject('box', np.array([0.1, 0.0, 0.03]), np.array([0, 0, 0, 1.0]),
-                    np.array([0.16, 0.10, 0.06])),
-         TrueObject('can', np.array([-0.1, 0.0, 0.06]), np.array([0, 0, 0, 1.0]),
-                    np.array([0.06, 0.06, 0.12])))
-
-
-@pytest.fixture(scope='module')
-def scene_set(tmp_path_factory):
-    """Return the folder of a set with one scene, seen from above."""
-    T = np.diag([1.0, -1.0, -1.0, 1.0])
-    T[2, 3] = 0.9
-    K = np.array([[150.0, 0, 79.5], [0, 150.0, 59.5], [0, 0, 1]])
-    camera = Camera('top', 160, 120, K, np.zeros(5), T)
-    ground = 0.5 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
-    meshes = [(MESHES[t.category].vertices + t.translation,
-               np.asarray(MESHES[t.category].faces, np.int32)) for t in TRUTH]
-    meshes.append((ground, np.array([[0, 1, 2], [0, 2, 3]], np.int32)))
-    depth = render_depth(meshes, camera)[0]
-    depth = np.where(np.isfinite(depth), depth, np.nan)
-    folder = tmp_path_factory.mktemp('sets') / 'small'
-    return write_scene_set(folder, 'small', MESHES, (camera,),
-                           [NewScene('one', (depth,), TRUTH)], 1)
-
-
-@pytest.fixture
-def ran(monkeypatch):
-    """Put in place of the commands what writes their arguments; return the names that ran."""
-    names = []
-
-    def execute(step, root):
-        names.append(step.name)
-        step.output.parent.mkdir(parents=True, exist_ok=True)
-        if step.kind in ('twin', 'train', 'plots'):
-            step.output.mkdir(exist_ok=True)
-            (step.output / 'file').write_text(step.name)
-        else:
-            step.output.write_text(step.name)
-        return run.Record(run.key_of(step), fingerprint.of_code(plan.CODE[step.kind]), 'abc',
-                          1.0, 2.0, 3.0)
-
-    monkeypatch.setattr(run, 'execute', execute)
-    return names
 
 
 def quiet(*arguments, **options):
@@ -75,8 +24,9 @@ def test_the_plan_runs_in_its_order(tmp_path, scene_set):
         made.add(step.output)
     names = [step.name for step in steps]
     assert len(set(names)) == len(names)
-    # Two rows of baselines with two steps, three profiles with four, pictures, and the twin.
-    assert len(names) == 2 * (2 * 2 + 3 * 4 + 1) + 1
+    # Two rows of baselines with two steps, three profiles with four, two steps a switch,
+    # two of pictures, and the twin.
+    assert len(names) == 2 * (2 * 2 + 3 * 4 + 2 * len(SWITCHES) + 2) + 1
 
 
 @pytest.mark.parametrize('sets, rows, word', [
@@ -191,31 +141,6 @@ def test_comments_do_not_count_as_code_but_numbers_do(tmp_path):
     assert digests[0] == digests[1] != digests[2]
 
 
-def truth_entries(shift=0.0):
-    """Return the truth as the objects of a results file, moved along x."""
-    return [{'category': t.category, 'score': 1.0, 'size': t.size.tolist(),
-             'translation': (t.translation + [shift, 0, 0]).tolist(),
-             'rotation_xyzw': t.rotation_xyzw.tolist()} for t in TRUTH]
-
-
-@pytest.fixture
-def computed(tmp_path, scene_set):
-    """Return a folder with real scores: the truth as the answer of best, spoilt as ppf's."""
-    layout = plan.Layout(tmp_path / 'results', 'small')
-    for row, shift, settings in (('best', 0.0, 'AB'), ('ppf', 0.07, 'A')):
-        files = []
-        for setting in settings:
-            files.append(layout.results(row, setting))
-            files[-1].parent.mkdir(parents=True, exist_ok=True)
-            files[-1].write_text(json.dumps({
-                'format': 'hooc-results/1', 'dataset': 'small', 'setting': setting,
-                'scenes': [{'scene': 'one', 'seconds': 2.0, 'energy': None,
-                            'objects': truth_entries(shift)}]}))
-        assert hooc(['evaluate', str(scene_set), *map(str, files), '--bop', '--json',
-                     str(layout.scores(row)), '--plots', str(layout.plots)]) == 0
-    return tmp_path / 'results'
-
-
 def cells(text, start):
     """Return the stripped cells of the Markdown rows that start with `start`."""
     return [[c.strip(' *`') for c in line.split('|')[1:-1]] for line in text.splitlines()
@@ -258,6 +183,33 @@ def test_pages_take_tables_between_their_markers(computed, tmp_path):
     assert pages[0].read_text() == new
 
 
+def test_the_worst_scenes_come_onto_the_page_of_their_set(write_scores, tmp_path):
+    layout = plan.Layout(tmp_path / 'results', 'small')
+    write_scores('best', 0.07, 'A', '--plots', layout.worst, '--worst', '5')
+    docs = tmp_path / 'docs'
+    (docs / 'images').mkdir(parents=True)
+    (docs / 'results.md').write_text('<!-- results: small worst -->\n<!-- end of results -->\n'
+                                     '<!-- results: small -->\n<!-- end of results -->\n')
+    written = page.write_pages([docs / 'results.md'], docs / 'images', layout.root, ['small'], {})
+    text = (docs / 'results.md').read_text()
+    assert cells(text, 'one')[0][1:4] == ['0.50', 'can',
+                                          'found 7 cm away; few pixels (120)']
+    assert [path.name for path in written] == ['results.md', 'results_small_worst.png']
+
+
+def test_the_worst_scenes_are_those_of_best(tmp_path, ran, scene_set):
+    def worst(*rows):
+        steps = plan.steps_of({'small': scene_set}, tmp_path, rows)
+        return [step for step in steps if step.kind == 'worst']
+
+    assert worst('ppf') == []
+    quiet(plan.steps_of({'small': scene_set}, tmp_path, ('best',)), tmp_path)
+    step, = worst('ppf')
+    layout = plan.Layout(tmp_path, 'small')
+    assert {layout.results('best', 'A'), layout.scores('best')} < set(step.inputs)
+    assert ran[-1] == 'small/worst'
+
+
 def test_a_marker_without_an_end_is_named():
     with pytest.raises(HoocError, match='a.md'):
         page.inserted('<!-- results: small -->\n', {}, 'a.md')
@@ -268,7 +220,9 @@ def test_the_pages_of_the_documentation_have_the_markers():
     names = set()
     for path in docs.glob('results*.md'):
         names |= page.inserted(path.read_text(), {}, str(path))[1]
-    assert names >= {'twin', 'twin details', 'dev', 'dev details', 'osd', 'osd details', 'steps'}
+    assert names >= {f'{name}{what}' for name in ('twin', 'dev', 'osd')
+                     for what in ('', ' details', ' ablations')} | {
+                         'steps', 'twin worst', 'dev worst'}
 
 
 def test_the_command_says_what_is_wrong(tmp_path, capsys):

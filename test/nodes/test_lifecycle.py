@@ -201,3 +201,13 @@ def test_a_simulated_clock_that_nobody_gives_is_named(bench):
     publisher = bench.peer.create_publisher(ClockMessage, '/clock', 1)
     assert bench.spin(lambda: node.count_publishers('/clock'))
     publisher.publish(ClockMessage(clock=node.get_clock().now().to_msg()))
+
+
+@pytest.mark.parametrize('kind', (classification_node.ClassificationNode,
+                                  candidate_node.CandidateNode,
+                                  parsing_node.ParsingNode))
+def test_models_that_cannot_be_read(bench, kind, tmp_path):
+    node = bench.add(kind, model=str(tmp_path))
+    assert node.trigger_configure() == FAILURE
+    assert 'model.json' in bench.reasons(node)['node'][1]
+    assert node.is_unconfigured()

@@ -18,6 +18,7 @@ the share of object k's volume inside any other chosen object. Where the paper i
 
 from hooc_perception.core.compositor import Compositor
 from hooc_perception.core.geometry import posed_vertices
+from hooc_perception.core.images_and_volumes import ImagesAndVolumes
 from hooc_perception.core.overlap import OverlapTerm
 from hooc_perception.core.render import render_patch
 from hooc_perception.core.types import Energy
@@ -50,7 +51,7 @@ def pixel_lists(observation, objects, models):
     return np.cumsum(counts), np.concatenate(pixels), np.concatenate(depths)
 
 
-class Eq1:
+class Eq1(ImagesAndVolumes):
     """
     Eq. 1 over the subsets of a pool, with everything that a search needs.
 
@@ -92,11 +93,6 @@ class Eq1:
         self._overlap = OverlapTerm(pool, models)
 
     @property
-    def mask(self):
-        """Return a copy of the current subset, (n,) bool."""
-        return self._images.mask
-
-    @property
     def value(self):
         """Return E of the current subset."""
         n = np.count_nonzero(self._images.mask)
@@ -108,16 +104,6 @@ class Eq1:
         n = np.count_nonzero(mask)
         mean = (shares + self._overlap.deltas()) / np.maximum(n + np.where(mask, -1, 1), 1)
         return self._images.deltas() / self.n_pixels + mean - shares / max(n, 1)
-
-    def flip(self, k):
-        """Let candidate k join the subset, or leave it if it is in."""
-        self._images.flip(k)
-        self._overlap.flip(k)
-
-    def reset(self, mask):
-        """Start again from the subset `mask` (n,) bool."""
-        self._images.reset(mask)
-        self._overlap.reset(mask)
 
     def evaluate(self, mask):
         """Return E of the subset `mask` (n,) bool; the current one stays."""

@@ -12,12 +12,13 @@ k covers; v_k the share of its volume inside others.
 """
 
 from hooc_perception.core.compositor import Compositor
+from hooc_perception.core.images_and_volumes import ImagesAndVolumes
 from hooc_perception.core.kernels import explain as stat
 from hooc_perception.core.overlap import OverlapTerm
 import numpy as np
 
 
-class JointEnergy:
+class JointEnergy(ImagesAndVolumes):
     """
     The joint energy over a pool; see core/compositor.py for what a search calls.
 
@@ -45,11 +46,6 @@ class JointEnergy:
         self._weight = config.overlap * scale
 
     @property
-    def mask(self):
-        """Return a copy of the current subset, (n,) bool."""
-        return self._images.mask
-
-    @property
     def value(self):
         """Return the energy of the current subset, in pixels."""
         return self._images.value + self._weight * self._overlap.value
@@ -62,16 +58,6 @@ class JointEnergy:
         """Return (n,) float64: what each would cost if it joined, whatever the group's limit."""
         return (self._images.deltas(limited=False)
                 + self._weight * self._overlap.deltas())
-
-    def flip(self, k):
-        """Let candidate k join the subset, or leave it if it is in."""
-        self._images.flip(k)
-        self._overlap.flip(k)
-
-    def reset(self, mask):
-        """Start again from the subset `mask` (n,) bool."""
-        self._images.reset(mask)
-        self._overlap.reset(mask)
 
     def evaluate(self, mask):
         """Return the energy of the subset `mask` (n,) bool; the current one stays."""

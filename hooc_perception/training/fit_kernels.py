@@ -118,6 +118,39 @@ def _shuffle_first(samples, lo, hi, k):
 
 
 @nb.njit(cache=True, nogil=True)
+def _look_at(samples, y, lo, hi, most, classes, counts):
+    """
+    Bring at most `most` random samples of a node to its first places; return how many.
+
+    :param classes: (m,) uint8 and `counts` (C,) int64, filled with their classes.
+    """
+    k = min(hi - lo, most)
+    if k < hi - lo:
+        _shuffle_first(samples, lo, hi, k)
+    counts[:] = 0
+    for i in range(k):
+        classes[i] = y[samples[lo + i]]
+        counts[classes[i]] += 1
+    return k
+
+
+@nb.njit(cache=True, nogil=True)
+def _part(samples, goes_left, lo, hi, buffer):
+    """Bring the samples of a node that go left before the others; return where these begin."""
+    a, b = lo, 0
+    for i in range(lo, hi):
+        if goes_left[i - lo]:
+            samples[a] = samples[i]
+            a += 1
+        else:
+            buffer[b] = samples[i]
+            b += 1
+    for i in range(b):
+        samples[a + i] = buffer[i]
+    return a
+
+
+@nb.njit(cache=True, nogil=True)
 def grow_tree(binned, y, samples, n_classes, n_bins, n_try, node_samples, max_depth, min_leaf,
               min_gain, seed):
     """
@@ -141,7 +174,9 @@ def grow_tree(binned, y, samples, n_classes, n_bins, n_try, node_samples, max_de
     bin_sizes = np.zeros(n_bins, np.int32)
     values = np.empty(m, np.uint8)
     classes = np.empty(m, np.uint8)
+    counts = np.zeros(n_classes, np.int64)
     buffer = np.empty(m, np.int32)
+    goes_left = np.empty(m, np.bool_)
     stack = [(0, 0, m, 0)]
     used = 1
     while len(stack):
@@ -149,13 +184,7 @@ def grow_tree(binned, y, samples, n_classes, n_bins, n_try, node_samples, max_de
         n = hi - lo
         if depth >= max_depth or n < 2 * min_leaf:
             continue
-        k = min(n, node_samples)
-        if k < n:
-            _shuffle_first(samples, lo, hi, k)
-        counts = np.zeros(n_classes, np.int64)
-        for i in range(k):
-            classes[i] = y[samples[lo + i]]
-            counts[classes[i]] += 1
+        k = _look_at(samples, y, lo, hi, node_samples, classes, counts)
         if counts.max() == k:
             continue
         least = max(1, min_leaf * k // n)
@@ -176,17 +205,9 @@ def grow_tree(binned, y, samples, n_classes, n_bins, n_try, node_samples, max_de
         if best_feature < 0:
             continue
         row = binned[best_feature]
-        a, b = lo, 0
         for i in range(lo, hi):
-            s = samples[i]
-            if row[s] <= best_bin:
-                samples[a] = s
-                a += 1
-            else:
-                buffer[b] = s
-                b += 1
-        for i in range(b):
-            samples[a + i] = buffer[i]
+            goes_left[i - lo] = row[samples[i]] <= best_bin
+        a = _part(samples, goes_left, lo, hi, buffer)
         if used + 2 > capacity:
             continue
         feature[node], split[node], left[node] = best_feature, best_bin, used
@@ -250,7 +271,9 @@ def grow_pixel_tree(images, scene, centre, y, samples, n_classes, n_tests, n_thr
     values = np.empty(node_samples, np.uint8)
     classes = np.empty(node_samples, np.uint8)
     cuts = np.empty(n_thresholds, np.int32)
+    counts = np.zeros(n_classes, np.int64)
     buffer = np.empty(m, np.int32)
+    goes_left = np.empty(m, np.bool_)
     stack = [(0, 0, m, 0)]
     used = 1
     while len(stack):
@@ -259,13 +282,7 @@ def grow_pixel_tree(images, scene, centre, y, samples, n_classes, n_tests, n_thr
         if depth >= max_depth or n < 2 * min_leaf:
             continue
         # A random subset of a large node suffices to rank tests; its cost is bounded.
-        k = min(n, node_samples)
-        if k < n:
-            _shuffle_first(samples, lo, hi, k)
-        counts = np.zeros(n_classes, np.int64)
-        for i in range(k):
-            classes[i] = y[samples[lo + i]]
-            counts[classes[i]] += 1
+        k = _look_at(samples, y, lo, hi, node_samples, classes, counts)
         if counts.max() == k:
             continue
         _draw_tests(n_tests, n_views, region, centre_share, view, offsets)
@@ -289,20 +306,13 @@ def grow_pixel_tree(images, scene, centre, y, samples, n_classes, n_tests, n_thr
         if best_test < 0:
             continue
         v = view[best_test]
-        a, b = lo, 0
         for i in range(lo, hi):
             s = samples[i]
-            r = respond(images[scene[s], v], centre[s, v], offsets[best_test, 0],
-                        offsets[best_test, 1], offsets[best_test, 2], offsets[best_test, 3], far)
-            if r <= best_cut:
-                samples[a] = s
-                a += 1
-            else:
-                buffer[b] = s
-                b += 1
-        for i in range(b):
-            samples[a + i] = buffer[i]
-        if a == lo or b == 0 or used + 2 > capacity:
+            goes_left[i - lo] = respond(
+                images[scene[s], v], centre[s, v], offsets[best_test, 0], offsets[best_test, 1],
+                offsets[best_test, 2], offsets[best_test, 3], far) <= best_cut
+        a = _part(samples, goes_left, lo, hi, buffer)
+        if a == lo or a == hi or used + 2 > capacity:
             continue
         feature[node], threshold[node], left[node] = n_tests_kept, best_cut, used
         test_view[n_tests_kept] = v

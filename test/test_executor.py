@@ -17,6 +17,7 @@ from hooc_perception.synthesis import twin
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.training.fit_forest import FitConfig
 from hooc_perception.training.fit_pixels import PixelFitConfig
+from hooc_perception.training.fit_verifier import VerifierConfig
 from hooc_perception.training.fused_scenes import FusedScenesConfig
 from hooc_perception.training.train import train_classifier
 import joblib
@@ -33,7 +34,8 @@ TINY = {
     'paper': (PixelFitConfig(structure_scenes=9, leaf_scenes=9, trees=2, structure_pixels=40,
                              leaf_pixels=60, tests_per_node=20),),
     'fast': (FusedScenesConfig(scenes=8, quantile_scenes=4, objects_low=2, objects_high=4),
-             FitConfig(trees=3, features_per_node=20, min_leaf=5)),
+             FitConfig(trees=3, features_per_node=20, min_leaf=5),
+             VerifierConfig(verifier_scenes=4, forest=FitConfig(trees=3, min_leaf=5))),
 }
 
 CHEAP = [word for text in ('propose.samples=3000', 'propose.pool=30', 'propose.polish=6',
@@ -80,6 +82,7 @@ def test_a_cluster_learns_the_same_model_bit_for_bit(cluster, models, profile):
     with executor(f'dask={cluster}'):
         there = train_classifier(models, cameras, profile, 3, 2, TINY[profile], jobs=2)
     assert set(here) == set(there)
+    assert ('verifier_feature' in here) == (profile == 'fast')
     for key, value in here.items():
         assert value.dtype == there[key].dtype and np.array_equal(value, there[key]), key
 

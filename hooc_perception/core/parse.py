@@ -52,7 +52,7 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
     verify_weight: float = param(80.0, 'joint: worth of the odds that the verifier gives a '
                                  'candidate, each unit of their logarithm; 0 = the energy '
                                  'decides alone', 'px', 0.0, 1000.0)
-    missing_against_false: float = param(2.0, 'joint: how much worse it is to miss an object than '
+    missing_against_false: float = param(3.0, 'joint: how much worse it is to miss an object than '
                                          'to report a false one', '', 0.01, 100.0)
     least_cost: float = param(40.0, 'joint: what an object costs at least, however probable, '
                               'where a category may stand there more than once', 'px', 0.0, 1e4)

@@ -178,12 +178,14 @@ def write_plot(path, grown, title):
             ax = axes[row, column]
             ax.plot(n, [getattr(p, what) for p in points], 'o-', color=colour)
             ax.axvline(BASE[axis], color='#6b7280', lw=0.8, ls=':')
-            ax.set_ylim(0, None)
             ax.grid(alpha=0.3)
             ax.spines[['top', 'right']].set_visible(False)
             if column == 0:
                 ax.set_ylabel(label)
         axes[1, column].set_xlabel('pixels, times 512 x 424' if axis == 'pixels' else axis)
+    for ax in axes[:, 0]:
+        # Only when all is drawn: a limit that is set stays, whatever a row's other axes hold.
+        ax.set_ylim(0, None)
     figure.suptitle(title, fontsize=10)
     Path(path).parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=110)

@@ -27,9 +27,9 @@ def search_scene(observation, probabilities, pool, models, config, rng, max_inst
     state, considered = Search(space.coarse, models, config, max_instances).with_more(pool), pool
     for turn in range(config.rounds + 1):
         found = state.search(rng, late)
-        state.merged(config.polish_steps, rng)
         if not found.converged or late():
             break
+        state.merged(config.polish_steps, rng)
         last = turn == config.rounds
         new = state.polished(config.turn_steps if last else config.polish_steps, rng, last)
         if more is not None and not last and not late():

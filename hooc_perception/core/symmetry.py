@@ -112,22 +112,23 @@ def rotation_error(R_est, R_true, symmetry=(1, 1, 1)):
     return float(np.arccos(np.clip((trace.max() - 1) / 2, -1.0, 1.0)))
 
 
-def half_turns(objects, models, least_rad=0.5):
+def half_turns(objects, models):
     """
     Return (Candidates, rows): objects turned by half a turn about each axis of their models.
 
+    Axes about which that is a symmetry are left out.
+
     :param models: tuple of GenericModel; class id c is models[c - 1].
-    :param least_rad: turns that a symmetry leaves nearer than this to the object are left out.
     :return: the turned objects, and the row (n,) int64 of `objects` that each comes from.
     """
     rows, turned = [], []
     for i, rotation in enumerate(Rotation.from_quat(objects.rotation_xyzw)):
-        symmetry = models[int(objects.category[i]) - 1].symmetry
-        for axis in range(3):
-            other = rotation * Rotation.from_rotvec(np.pi * np.eye(3)[axis])
-            if rotation_error(other.as_matrix(), rotation.as_matrix(), symmetry) > least_rad:
-                rows.append(i)
-                turned.append(other.as_quat())
+        symmetry = np.asarray(models[int(objects.category[i]) - 1].symmetry)
+        if is_ball(symmetry):
+            continue
+        for axis in np.flatnonzero(symmetry % 2 == 1):
+            rows.append(i)
+            turned.append((rotation * Rotation.from_rotvec(np.pi * np.eye(3)[axis])).as_quat())
     rows = np.array(rows, np.int64)
     return replace(objects.take(rows), rotation_xyzw=np.array(turned).reshape(-1, 4)), rows
 

@@ -11,9 +11,10 @@ hardly more may be the true one. All of it was calibrated on synthetic scenes (d
 says how well it holds).
 """
 
-from hooc_perception.core.evidence import hypotheses_of, PixelWeights
+from hooc_perception.core.evidence import hypotheses_of
 from hooc_perception.core.kernels import explain as stat
-from hooc_perception.core.symmetry import is_ball
+from hooc_perception.core.search import weights_of
+from hooc_perception.core.symmetry import half_turns, is_ball
 from hooc_perception.core.workspace import workspace_of
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -87,8 +88,7 @@ class _Cost:
     def __init__(self, evidence, objects, models, config):
         """Compose the answer."""
         self.evidence, self.config = evidence, config
-        self.weights = PixelWeights(config.tolerance_m, config.normal_weight,
-                                    config.category_weight, config.free_weight)
+        self.weights = weights_of(config)
         self.H = hypotheses_of(objects, models)
         self.category = objects.category.astype(np.int64)
         _, lists = evidence.explain(self.H, self.category, self.weights, lists=True)
@@ -148,21 +148,10 @@ def _information(cost, longest):
 
 def _flip_probabilities(cost, objects, models, rng):
     """Return (n,) how likely a half turn of the answer is the true orientation."""
-    H, own = list(cost.H), list(range(len(objects)))
-    for k in range(len(objects)):
-        symmetry = np.asarray(models[int(objects.category[k]) - 1].symmetry)
-        if is_ball(symmetry):
-            continue
-        for axis in np.flatnonzero(symmetry % 2 == 1):      # the others have it as a symmetry
-            turned = cost.H[k].copy()
-            half_turn = np.zeros(3)
-            half_turn[axis] = np.pi
-            turned[3:7] = (Rotation.from_quat(turned[3:7])
-                           * Rotation.from_rotvec(half_turn)).as_quat()
-            H.append(turned)
-            own.append(k)
-    own = np.array(own)
-    costs, shown = cost.of(cost.polished(np.array(H), own, rng), own)
+    turned, rows = half_turns(objects, models)
+    H = np.concatenate([cost.H, hypotheses_of(turned, models)])
+    own = np.concatenate([np.arange(len(objects)), rows])
+    costs, shown = cost.of(cost.polished(H, own, rng), own)
     out, n = np.zeros(len(objects)), len(objects)
     for k in range(n):
         others = np.flatnonzero(own[n:] == k) + n

@@ -8,5 +8,6 @@ from hooc_perception import kernel_cache
 
 # Before the first kernel is imported: numba reads its variables only once.
 kernel_cache.choose()
+kernel_cache.drop_stale()
 # The TBB that other libraries bring along is too old for numba, which would warn and go on.
 os.environ.setdefault('NUMBA_THREADING_LAYER_PRIORITY', 'omp workqueue tbb')

@@ -1,7 +1,9 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""A place for numba's compiled kernels where the package itself cannot be written to."""
+"""Where numba keeps compiled kernels, and when they are out of date."""
 
+import contextlib
+import hashlib
 import os
 from pathlib import Path
 import tempfile
@@ -41,6 +43,42 @@ def choose(environment=os.environ, package=Path(__file__).parent, temporary=None
     """
     if environment.get('NUMBA_CACHE_DIR') or writable(package):
         return
-    home = environment.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')
-    if not writable(home):
+    if not writable(_home(environment)):
         environment['NUMBA_CACHE_DIR'] = str(private_folder(temporary or tempfile.gettempdir()))
+
+
+def drop_stale(environment=os.environ, package=Path(__file__).parent):
+    """
+    Remove compiled kernels that were made from other sources than lie there now.
+
+    numba compiles a kernel anew where its own file has changed, not where a kernel of another
+    file that it calls has: after an update, old code would run inside of new.
+    """
+    sources = sorted((package / 'core/kernels').glob('*.py'))
+    now = hashlib.sha256()
+    for source in sources:
+        now.update(f'{source} {source.stat().st_mtime_ns} {source.stat().st_size}\n'.encode())
+    root, folders = _place(environment, package)
+    # In the package's own cache folder, which git and builds leave out.
+    stamp = root / '__pycache__' / f'{package.name}.sources'
+    with contextlib.suppress(OSError):
+        if stamp.exists() and stamp.read_text() == now.hexdigest():
+            return
+        stamp.parent.mkdir(parents=True, exist_ok=True)
+        for folder in folders:
+            for index in root.glob(f'{folder}/*.nbi'):
+                index.unlink(missing_ok=True)
+        stamp.write_text(now.hexdigest())
+
+
+def _place(environment, package):
+    """Return (folder for a stamp, patterns below it of folders with compiled kernels)."""
+    if not environment.get('NUMBA_CACHE_DIR') and writable(package):
+        return package, ('core/kernels/__pycache__', 'training/__pycache__')
+    root = environment.get('NUMBA_CACHE_DIR') or Path(_home(environment)) / 'numba'
+    return Path(root), ('kernels_*', 'training_*')
+
+
+def _home(environment):
+    """Return the folder of the user's caches."""
+    return environment.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')

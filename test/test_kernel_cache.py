@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where compiled kernels go when the package, or even the user's home, is read-only."""
+"""Where compiled kernels go when the package or the user's home is read-only, and when they go."""
 
 import os
 from pathlib import Path
@@ -70,3 +70,26 @@ def test_kernels_are_kept_in_the_chosen_folder(tmp_path):
     subprocess.run([sys.executable, '-c', code], check=True,
                    env={**os.environ, 'NUMBA_CACHE_DIR': str(tmp_path)})
     assert list(tmp_path.rglob('*.nbc'))
+
+
+@pytest.mark.parametrize('own_folder', [False, True])
+def test_kernels_of_changed_sources_are_dropped(tmp_path, own_folder):
+    """A kernel is compiled with those of other files inside: numba sees only its own file."""
+    package, cache = tmp_path / 'hooc_perception', tmp_path / 'cache'
+    (package / 'core/kernels').mkdir(parents=True)
+    source = package / 'core/kernels/raster.py'
+    source.write_text('1')
+    environment = {'NUMBA_CACHE_DIR': str(cache)} if own_folder else {}
+    kernel_cache.drop_stale(environment, package)
+    folder = cache / 'kernels_1f' if own_folder else package / 'core/kernels/__pycache__'
+    folder.mkdir(parents=True)
+    index, other = folder / 'explain.explain_all-1.py311.nbi', cache / 'theirs_2e/mine.nbi'
+    index.touch()
+    other.parent.mkdir(parents=True)
+    other.touch()
+    kernel_cache.drop_stale(environment, package)
+    assert index.exists()
+    source.write_text('12')
+    kernel_cache.drop_stale(environment, package)
+    assert not index.exists()
+    assert other.exists()

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.kernels import explain as kernel
+from hooc_perception.core.render import closed
 import numpy as np
 
 
@@ -103,7 +104,8 @@ class Evidence:
         self._shared = (self.K, self.R, self.t, self.size, self.first, self.depth,
                         self.foreground, self.normals, self.patch, self.patch_size, self.p,
                         self.p_row)
-        self._meshes = self.vertices, self.vertex_start, self.faces, self.face_start
+        self._meshes = (self.vertices, self.vertex_start, self.faces, self.face_start,
+                        np.array([closed(m) for m in models]))
 
     def explain(self, hypotheses, category, weights, context=None, lists=False, me=None):
         """

@@ -4,7 +4,10 @@
 
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.kernels import raster
+from hooc_perception.core.memo import per_model
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 
 def projected(vertices_world, camera):
@@ -46,3 +49,24 @@ def render_patch(vertices_world, faces, camera):
     rows, cols = np.nonzero(np.isfinite(depth))
     pixels = ((rows + v0) * camera.width + cols + u0).astype(np.int32)
     return pixels, depth[rows, cols]
+
+
+@per_model
+def closed(model):
+    """
+    Return whether a GenericModel is made of closed surfaces that are all wound outwards.
+
+    Of such a mesh only the faces towards the camera need drawing (kernels/raster.py).
+    """
+    faces = model.faces.astype(np.int64)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    n = len(model.vertices)
+    there, back = edges @ [n, 1], edges @ [1, n]
+    paired = np.array_equal(np.sort(there), np.sort(back))
+    if not len(faces) or not paired or len(np.unique(there)) < len(there):
+        return False
+    graph = coo_array((np.ones(len(edges), bool), edges.T), (n, n))
+    part = connected_components(graph, directed=False)[1][faces[:, 0]]
+    a, b, c = (model.vertices[faces[:, k]] for k in range(3))
+    return bool((np.bincount(part, np.einsum('ij,ij->i', a, np.cross(b, c)))[np.unique(part)]
+                 > 0).all())

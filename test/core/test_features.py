@@ -5,6 +5,7 @@
 from hooc_perception.core import features
 from hooc_perception.core.geometry import inverse, project, transform
 from hooc_perception.core.kernels import forest_field, forest_segments, forest_smooth
+from hooc_perception.core.kernels.forest_texture import normal_shape
 import numpy as np
 import pytest
 
@@ -137,3 +138,22 @@ def test_probabilities_spread_along_edges_and_stop_at_cuts():
     np.testing.assert_allclose(out[3], p[1], atol=1e-5)
     # Nobody knows anything of the last voxel: background.
     np.testing.assert_allclose(out[4], [1, 0, 0])
+
+
+@pytest.mark.parametrize('n', [1, 2, 3, 8])
+def test_the_shape_of_a_bundle_of_normals_is_as_lapack_says(n):
+    rng = np.random.default_rng(n)
+    for _ in range(50):
+        normals = rng.normal(size=(n, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        moment, out = normals.T @ normals / n, np.empty(4)
+        normal_shape(moment[np.triu_indices(3)], out)
+        values, vectors = np.linalg.eigh(moment)
+        assert np.allclose(out[:2], values[:2], atol=1e-9)
+        if values[2] - values[1] > 1e-3:
+            assert out[3] == pytest.approx(abs(vectors[2, 2]), abs=1e-6)
+        if values[1] - values[0] > 1e-3:
+            assert out[2] == pytest.approx(abs(vectors[2, 0]), abs=1e-6)
+    flat, out = np.array([1.0, 0, 0, 0, 0, 0]), np.empty(4)
+    normal_shape(flat, out)
+    assert np.allclose(out[[0, 1, 3]], 0), 'one direction alone has no second'

@@ -5,8 +5,8 @@
 from dataclasses import replace
 
 from hooc_perception.core.geometry import inverse, rays, transform
-from hooc_perception.core.kernels.raster import NEAR_M
-from hooc_perception.core.render import projected, render_depth, render_patch
+from hooc_perception.core.kernels.raster import draw, NEAR_M
+from hooc_perception.core.render import closed, projected, render_depth, render_patch
 import numpy as np
 import open3d
 import pytest
@@ -127,3 +127,41 @@ def test_the_picture_depends_on_the_relative_pose_alone(desk, cluttered, tilt):
     assert np.abs(depth[same] - again[same]).max() < 1e-5
     np.testing.assert_allclose(inverse(moved.T_world_camera) @ moved.T_world_camera, np.eye(4),
                                atol=1e-12)
+
+
+def drawn(vertices, faces, camera, only_facing=False):
+    """Return (depth, face) images of one posed mesh."""
+    depth = np.full((camera.height, camera.width), np.inf, np.float32)
+    face = np.full(depth.shape, -1, np.int32)
+    draw(projected(vertices, camera), faces, -1, 0, 0, depth, face, only_facing)
+    return depth, face
+
+
+def test_faces_turned_away_from_the_camera_change_no_picture_of_a_closed_mesh(desk, cluttered):
+    for vertices, faces in cluttered:
+        for camera in desk.cameras:
+            depth, face = drawn(vertices, faces, camera)
+            depth_2, face_2 = drawn(vertices, faces, camera, True)
+            np.testing.assert_array_equal(depth, depth_2)
+            np.testing.assert_array_equal(face, face_2)
+    _, backs = drawn(vertices, faces[:, ::-1].copy(), camera)
+    assert (backs >= 0).any() and (drawn(vertices, faces[:, ::-1].copy(), camera, True)[1]
+                                   != backs).any()
+
+
+def test_a_mesh_is_closed_where_every_edge_has_its_counterpart_and_each_part_faces_outwards(
+        things):
+    model = things[0]
+    assert all(closed(m) for m in things)
+    n = len(model.vertices)
+    far = np.concatenate([model.vertices, model.vertices + 1.0])
+    twice = np.concatenate([model.faces, model.faces + n]).astype(np.int32)
+    inverted = np.concatenate([model.faces, model.faces[:, ::-1] + n]).astype(np.int32)
+    assert closed(replace(model, vertices=far, faces=twice))
+    for name, bad in (('open', replace(model, faces=model.faces[1:])),
+                      ('wound inwards', replace(model, faces=model.faces[:, ::-1])),
+                      ('one part inwards', replace(model, vertices=far, faces=inverted)),
+                      ('one face turned over', replace(model, faces=np.concatenate(
+                          [model.faces[:1, ::-1], model.faces[1:]]))),
+                      ('no face', replace(model, faces=model.faces[:0]))):
+        assert not closed(bad), name

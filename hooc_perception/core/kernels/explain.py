@@ -47,13 +47,14 @@ def pixel_cost(z, d, foreground, cosine, unlikely, tolerance, w_normal, w_class,
             + w_class * unlikely), 1
 
 
-@nb.njit(cache=True)
-def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, first, depth,
-                foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal, w_class,
-                w_free, stats, pull, emit_at, out_pixel, out_depth, out_cost):
+@nb.njit(cache=True, error_model='numpy')
+def explain_one(h, category, vertices, faces, closed, me, context, K, R_cw, t_cw, size, first,
+                depth, foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal,
+                w_class, w_free, stats, pull, emit_at, out_pixel, out_depth, out_cost):
     """
     Hold one hypothesis against every view.
 
+    :param closed: whether only the faces towards the camera are drawn, see raster.draw.
     :param context: what is shown already: tuple of (P,) arrays owner int32, depth float32, cost
         float32 of the nearest member and depth, cost of the next one; inf and the cost of
         showing nothing where there is none. Only pixels where the hypothesis is nearer count.
@@ -89,7 +90,7 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
             continue
         z = np.full((v1 - v0, u1 - u0), np.inf, np.float32)
         face = np.zeros(z.shape, np.int32)
-        raster.draw(uvz, faces, -1, u0, v0, z, face)
+        raster.draw(uvz, faces, -1, u0, v0, z, face, closed)
         cam = -(R_cw[v].T @ t_cw[v])
         for y in range(v1 - v0):
             for x in range(u1 - u0):
@@ -180,14 +181,14 @@ def explain_one(h, category, vertices, faces, me, context, K, R_cw, t_cw, size, 
 
 
 @nb.njit(cache=True, parallel=True)
-def explain_all(H, category, me, vertices, vertex_start, faces, face_start, context, K, R_cw,
-                t_cw, size, first, depth, foreground, normals, patch, patch_size, p, p_row,
+def explain_all(H, category, me, vertices, vertex_start, faces, face_start, closed, context, K,
+                R_cw, t_cw, size, first, depth, foreground, normals, patch, patch_size, p, p_row,
                 tolerance, w_normal, w_class, w_free, emit_at, out_pixel, out_depth, out_cost):
     """
     Run explain_one for every hypothesis (m, 10).
 
     :param category: (m,) class ids; meshes are concatenated, with faces relative to their own
-        first vertex: vertices[vertex_start[c - 1]:vertex_start[c]].
+        first vertex: vertices[vertex_start[c - 1]:vertex_start[c]]; closed (categories,) bool.
     :param emit_at: (m,) int64, where each writes its pixel lists; -1 = not at all.
     :return: (stats (m, STATS), n (m,)).
     """
@@ -198,17 +199,18 @@ def explain_all(H, category, me, vertices, vertex_start, faces, face_start, cont
         c = category[k]
         n[k] = explain_one(
             H[k], c, vertices[vertex_start[c - 1]:vertex_start[c]],
-            faces[face_start[c - 1]:face_start[c]], me[k], context, K, R_cw, t_cw, size, first,
-            depth, foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal, w_class,
-            w_free, stats[k], np.empty((0, 0)), emit_at[k], out_pixel, out_depth, out_cost)
+            faces[face_start[c - 1]:face_start[c]], closed[c - 1], me[k], context, K, R_cw, t_cw,
+            size, first, depth, foreground, normals, patch, patch_size, p, p_row, tolerance,
+            w_normal, w_class, w_free, stats[k], np.empty((0, 0)), emit_at[k], out_pixel,
+            out_depth, out_cost)
     return stats, n
 
 
 @nb.njit(cache=True, parallel=True)
-def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start, context, K,
-               R_cw, t_cw, size, first, depth, foreground, normals, patch, patch_size, p, p_row,
-               tolerance, w_normal, w_class, w_free, complexity, prior, n_steps, sigma_t,
-               sigma_r, sigma_s):
+def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start, closed,
+               context, K, R_cw, t_cw, size, first, depth, foreground, normals, patch,
+               patch_size, p, p_row, tolerance, w_normal, w_class, w_free, complexity, prior,
+               n_steps, sigma_t, sigma_r, sigma_s):
     """
     Climb with every hypothesis (m, 10), in place, against the images.
 
@@ -240,9 +242,10 @@ def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start
                 fresh = False
             elif i > 0:
                 stepped(sigma_t, sigma_r, sigma_s, step, 1.0, q, trial)
-            explain_one(trial, c, V, F, me[k], context, K, R_cw, t_cw, size, first, depth,
-                        foreground, normals, patch, no_patches, p, p_row, tolerance, w_normal,
-                        w_class, w_free, stats, there, -1, none_i, none_f, none_f)
+            explain_one(trial, c, V, F, closed[c - 1], me[k], context, K, R_cw, t_cw, size,
+                        first, depth, foreground, normals, patch, no_patches, p, p_row,
+                        tolerance, w_normal, w_class, w_free, stats, there, -1, none_i,
+                        none_f, none_f)
             a, b, d = np.log(trial[7]), np.log(trial[8]), np.log(trial[9])
             value = stats[DELTA] + stats[SHOWN] * (
                 complexity + prior * (a * a + b * b + d * d))

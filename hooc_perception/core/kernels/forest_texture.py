@@ -49,6 +49,41 @@ def _diffuse(values, start, other, w, steps):
     return now
 
 
+@nb.njit(cache=True, error_model='numpy')
+def eigen(a, v):
+    """
+    Diagonalise a symmetric (3, 3) matrix in place; v (3, 3) gets the eigenvectors as columns.
+
+    Cyclic Jacobi rotations (Golub & Van Loan, 8.5): a call of LAPACK costs ten times as much.
+    """
+    for i in range(3):
+        for j in range(3):
+            v[i, j] = 1.0 if i == j else 0.0
+    for _ in range(12):
+        off = abs(a[0, 1]) + abs(a[0, 2]) + abs(a[1, 2])
+        if off <= 1e-12 * (abs(a[0, 0]) + abs(a[1, 1]) + abs(a[2, 2])):
+            break
+        for p in range(2):
+            for q in range(p + 1, 3):
+                if a[p, q] == 0.0:
+                    continue
+                theta = 0.5 * (a[q, q] - a[p, p]) / a[p, q]
+                t = 1.0 / (abs(theta) + np.sqrt(theta * theta + 1.0))
+                if theta < 0:
+                    t = -t
+                c = 1.0 / np.sqrt(t * t + 1.0)
+                s = t * c
+                for k in range(3):
+                    x, y = a[k, p], a[k, q]
+                    a[k, p], a[k, q] = c * x - s * y, s * x + c * y
+                for k in range(3):
+                    x, y = a[p, k], a[q, k]
+                    a[p, k], a[q, k] = c * x - s * y, s * x + c * y
+                for k in range(3):
+                    x, y = v[k, p], v[k, q]
+                    v[k, p], v[k, q] = c * x - s * y, s * x + c * y
+
+
 @nb.njit(cache=True)
 def normal_shape(tensor, out):
     """
@@ -57,13 +92,18 @@ def normal_shape(tensor, out):
     The two smaller eigenvalues (plane 0 0, cylinder 0 1/2, ball 1/3 1/3), and the vertical
     components of the axis that the normals avoid and of their main direction.
     """
-    a = np.empty((3, 3))
+    a, v = np.empty((3, 3)), np.empty((3, 3))
     a[0, 0], a[0, 1], a[0, 2], a[1, 1], a[1, 2], a[2, 2] = (
         tensor[0], tensor[1], tensor[2], tensor[3], tensor[4], tensor[5])
     a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
-    values, vectors = np.linalg.eigh(a)
-    out[0], out[1] = values[0], values[1]
-    out[2], out[3] = abs(vectors[2, 0]), abs(vectors[2, 2])
+    eigen(a, v)
+    low, high = 0, 0
+    for k in range(1, 3):
+        low = k if a[k, k] < a[low, low] else low
+        high = k if a[k, k] >= a[high, high] else high
+    middle = 3 - low - high if low != high else low
+    out[0], out[1] = a[low, low], a[middle, middle]
+    out[2], out[3] = abs(v[2, low]), abs(v[2, high])
 
 
 @nb.njit(cache=True, parallel=True)

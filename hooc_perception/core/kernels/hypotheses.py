@@ -32,7 +32,7 @@ def rotation_of(h, R):
     R[2, 0], R[2, 1], R[2, 2] = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, error_model='numpy')
 def evidence(h, points, normals, first, last, field, origin, voxel, R, pull):
     """
     Return (agree, violate, shell) summed over model points first..last - 1 of hypothesis `h`.
@@ -49,55 +49,54 @@ def evidence(h, points, normals, first, last, field, origin, voxel, R, pull):
     nx, ny, nz = field.shape[:3]
     inv = 1.0 / voxel
     ox, oy, oz = (h[0] - origin[0]) * inv, (h[1] - origin[1]) * inv, (h[2] - origin[2]) * inv
-    sx, sy, sz = h[7], h[8], h[9]
+    px, py, pz = h[7] * inv, h[8] * inv, h[9] * inv
+    qx, qy, qz = 1.0 / h[7], 1.0 / h[8], 1.0 / h[9]
+    reach = SHELL_M * inv
+    # Under the table by more than a centimetre nothing can be.
+    lowest = (-0.010 - origin[2]) * inv
     agree = 0.0
     violate = 0.0
     shell = 0.0
     for k in range(first, last):
-        x, y, z = points[k, 0] * sx * inv, points[k, 1] * sy * inv, points[k, 2] * sz * inv
-        gx = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + ox
-        gy = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + oy
+        x, y, z = points[k, 0] * px, points[k, 1] * py, points[k, 2] * pz
         gz = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + oz
-        # Under the table by more than a centimetre nothing can be.
-        if gz * voxel + origin[2] < -0.010:
+        if gz < lowest:
             violate += 1.0
             continue
-        ix, iy, iz = int(np.floor(gx)), int(np.floor(gy)), int(np.floor(gz))
-        if ix < 0 or iy < 0 or iz < 0 or ix >= nx or iy >= ny or iz >= nz:
+        gx = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + ox
+        gy = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + oy
+        if not (0.0 <= gx < nx and 0.0 <= gy < ny and 0.0 <= gz < nz):
             violate += 0.7
             continue
+        ix, iy, iz = int(gx), int(gy), int(gz)
         d = field[ix, iy, iz, 0]
         f = field[ix, iy, iz, 1]
         if f > 0 and d > 100:
             violate += f / 255.0 * min(1.0, (d - 100) / 100.0)
+        a, b, c = normals[k, 0] * qx, normals[k, 1] * qy, normals[k, 2] * qz
+        n = 1.0 / np.sqrt(a * a + b * b + c * c + 1e-20)
+        a, b, c = a * n, b * n, c * n
+        wx = R[0, 0] * a + R[0, 1] * b + R[0, 2] * c
+        wy = R[1, 0] * a + R[1, 1] * b + R[1, 2] * c
+        wz = R[2, 0] * a + R[2, 1] * b + R[2, 2] * c
         if d < 255:
-            a, b, c = normals[k, 0] / sx, normals[k, 1] / sy, normals[k, 2] / sz
-            n = 1.0 / np.sqrt(a * a + b * b + c * c + 1e-20)
-            dot = n * ((R[0, 0] * a + R[0, 1] * b + R[0, 2] * c) * (field[ix, iy, iz, 2] - 128.0)
-                       + (R[1, 0] * a + R[1, 1] * b + R[1, 2] * c)
-                       * (field[ix, iy, iz, 3] - 128.0)
-                       + (R[2, 0] * a + R[2, 1] * b + R[2, 2] * c)
-                       * (field[ix, iy, iz, 4] - 128.0)) / 127.0
+            u = (field[ix, iy, iz, 2] - 128.0) / 127.0
+            v = (field[ix, iy, iz, 3] - 128.0) / 127.0
+            w = (field[ix, iy, iz, 4] - 128.0) / 127.0
+            dot = wx * u + wy * v + wz * w
             if dot > 0:
                 e = d / 255.0
                 agree += (1.0 - e * e) * min(1.0, dot)
                 if pull.shape[0] and dot > 0.3:
-                    u = (field[ix, iy, iz, 2] - 128.0) / 127.0
-                    v = (field[ix, iy, iz, 3] - 128.0) / 127.0
-                    w = (field[ix, iy, iz, 4] - 128.0) / 127.0
                     height = ((field[ix, iy, iz, 5] - 128.0) * plane
                               + voxel * (u * (gx - ix - 0.5) + v * (gy - iy - 0.5)
                                          + w * (gz - iz - 0.5)))
                     accumulate(pull, h, R, gx * voxel + origin[0], gy * voxel + origin[1],
                                gz * voxel + origin[2], u, v, w, height, min(1.0, dot))
         # Just outside of the model there should be air: else it lies inside a larger thing.
-        a, b, c = normals[k, 0] / sx, normals[k, 1] / sy, normals[k, 2] / sz
-        n = SHELL_M * inv / np.sqrt(a * a + b * b + c * c + 1e-20)
-        ix = int(np.floor(gx + n * (R[0, 0] * a + R[0, 1] * b + R[0, 2] * c)))
-        iy = int(np.floor(gy + n * (R[1, 0] * a + R[1, 1] * b + R[1, 2] * c)))
-        iz = int(np.floor(gz + n * (R[2, 0] * a + R[2, 1] * b + R[2, 2] * c)))
-        if 0 <= ix < nx and 0 <= iy < ny and 0 <= iz < nz:
-            ds = field[ix, iy, iz, 0]
+        gx, gy, gz = gx + reach * wx, gy + reach * wy, gz + reach * wz
+        if 0.0 <= gx < nx and 0.0 <= gy < ny and 0.0 <= gz < nz:
+            ds = field[int(gx), int(gy), int(gz), 0]
             if ds < 90:
                 shell += 1.0 - ds / 90.0
     return agree, violate, shell
@@ -118,20 +117,22 @@ def quick_field(field):
     return out
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, error_model='numpy')
 def quick(h, points, n, coarse, origin, voxel, R):
     """Return the sum of `coarse` over the first n model points of hypothesis `h`."""
     rotation_of(h, R)
     nx, ny, nz = coarse.shape
     inv = 1.0 / voxel
+    ox, oy, oz = (h[0] - origin[0]) * inv, (h[1] - origin[1]) * inv, (h[2] - origin[2]) * inv
+    px, py, pz = h[7] * inv, h[8] * inv, h[9] * inv
     total = 0.0
     for k in range(n):
-        x, y, z = points[k, 0] * h[7], points[k, 1] * h[8], points[k, 2] * h[9]
-        ix = int(np.floor((R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + h[0] - origin[0]) * inv))
-        iy = int(np.floor((R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + h[1] - origin[1]) * inv))
-        iz = int(np.floor((R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + h[2] - origin[2]) * inv))
-        if 0 <= ix < nx and 0 <= iy < ny and 0 <= iz < nz:
-            total += coarse[ix, iy, iz]
+        x, y, z = points[k, 0] * px, points[k, 1] * py, points[k, 2] * pz
+        gx = R[0, 0] * x + R[0, 1] * y + R[0, 2] * z + ox
+        gy = R[1, 0] * x + R[1, 1] * y + R[1, 2] * z + oy
+        gz = R[2, 0] * x + R[2, 1] * y + R[2, 2] * z + oz
+        if 0.0 <= gx < nx and 0.0 <= gy < ny and 0.0 <= gz < nz:
+            total += coarse[int(gx), int(gy), int(gz)]
         else:
             total -= 70.0
     return total

@@ -41,18 +41,38 @@ def accumulate(A, h, R, x, y, z, nx, ny, nz, residual, weight):
     """
     nx, ny, nz = np.float64(nx), np.float64(ny), np.float64(nz)
     px, py, pz = x - h[0], y - h[1], z - h[2]
-    J = (nx, ny, nz, py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx,
-         (R[0, 0] * nx + R[1, 0] * ny + R[2, 0] * nz)
-         * (R[0, 0] * px + R[1, 0] * py + R[2, 0] * pz),
-         (R[0, 1] * nx + R[1, 1] * ny + R[2, 1] * nz)
-         * (R[0, 1] * px + R[1, 1] * py + R[2, 1] * pz),
-         (R[0, 2] * nx + R[1, 2] * ny + R[2, 2] * nz)
-         * (R[0, 2] * px + R[1, 2] * py + R[2, 2] * pz))
-    for i in range(9):
-        w = weight * J[i]
-        for j in range(i, 9):
-            A[i, j] += w * J[j]
-        A[i, 9] += w * residual
+    j3, j4, j5 = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
+    j6 = ((R[0, 0] * nx + R[1, 0] * ny + R[2, 0] * nz)
+          * (R[0, 0] * px + R[1, 0] * py + R[2, 0] * pz))
+    j7 = ((R[0, 1] * nx + R[1, 1] * ny + R[2, 1] * nz)
+          * (R[0, 1] * px + R[1, 1] * py + R[2, 1] * pz))
+    j8 = ((R[0, 2] * nx + R[1, 2] * ny + R[2, 2] * nz)
+          * (R[0, 2] * px + R[1, 2] * py + R[2, 2] * pz))
+    # Called for every pixel of every trial: loops over a tuple take four times as long.
+    _add(A, 0, weight * nx, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 1, weight * ny, 0.0, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 2, weight * nz, 0.0, 0.0, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 3, weight * j3, 0.0, 0.0, 0.0, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 4, weight * j4, 0.0, 0.0, 0.0, 0.0, j4, j5, j6, j7, j8, residual)
+    _add(A, 5, weight * j5, 0.0, 0.0, 0.0, 0.0, 0.0, j5, j6, j7, j8, residual)
+    _add(A, 6, weight * j6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, j6, j7, j8, residual)
+    _add(A, 7, weight * j7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, j7, j8, residual)
+    _add(A, 8, weight * j8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, j8, residual)
+
+
+@nb.njit(cache=True, inline='always')
+def _add(A, row, w, a, b, c, d, e, f, g, i, j, k):
+    """Add w times ten numbers to a row of A."""
+    A[row, 0] += w * a
+    A[row, 1] += w * b
+    A[row, 2] += w * c
+    A[row, 3] += w * d
+    A[row, 4] += w * e
+    A[row, 5] += w * f
+    A[row, 6] += w * g
+    A[row, 7] += w * i
+    A[row, 8] += w * j
+    A[row, 9] += w * k
 
 
 @nb.njit(cache=True)

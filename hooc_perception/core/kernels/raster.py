@@ -25,8 +25,18 @@ def project_vertices(vertices_world, R_camera_world, t_camera_world, fx, fy, cx,
     return out
 
 
-@nb.njit(cache=True)
-def draw(uvz, faces, label, u0, v0, depth, labels):
+@nb.njit(cache=True, inline='always')
+def _clip(low, high, at_zero, slope, inverse):
+    """Return the part of [low, high] where at_zero + slope * x >= 0, a little too wide."""
+    if slope > 1e-6:
+        return max(low, -at_zero * inverse - 0.01), high
+    if slope < -1e-6:
+        return low, min(high, -at_zero * inverse + 0.01)
+    return low, high
+
+
+@nb.njit(cache=True, error_model='numpy')
+def draw(uvz, faces, label, u0, v0, depth, labels, closed=False):
     """
     Draw a projected mesh into a window whose first pixel is (u0, v0).
 
@@ -37,6 +47,8 @@ def draw(uvz, faces, label, u0, v0, depth, labels):
     :param depth: (h, w) float32, read and written; start with inf.
     :param labels: (h, w) int32, set to `label` where this mesh is nearest; a negative label
         stands for the index of the face.
+    :param closed: the mesh is a closed surface wound outwards: faces turned away from the camera
+        lie behind others and are not drawn.
     """
     h, w = depth.shape
     for f in range(faces.shape[0]):
@@ -48,16 +60,36 @@ def draw(uvz, faces, label, u0, v0, depth, labels):
         bx, by = uvz[b, 0] - u0, uvz[b, 1] - v0
         cx, cy = uvz[c, 0] - u0, uvz[c, 1] - v0
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
-        if area == 0.0:
+        if area == 0.0 or (closed and area > 0.0):
             continue
         x_lo = max(0, int(np.ceil(min(ax, bx, cx))))
         x_hi = min(w - 1, int(np.floor(max(ax, bx, cx))))
         y_lo = max(0, int(np.ceil(min(ay, by, cy))))
         y_hi = min(h - 1, int(np.floor(max(ay, by, cy))))
+        if x_lo > x_hi or y_lo > y_hi:
+            continue
         ia, ib, ic = 1.0 / (za * area), 1.0 / (zb * area), 1.0 / (zc * area)
         sign = 1.0 if area > 0 else -1.0
+        # What a step along x adds to wa, wb and wc below, towards the inside.
+        da, db = (by - cy) * sign, (cy - ay) * sign
+        dc = -(da + db)
+        # Long thin triangles fill little of their window: only the span of a row is walked.
+        wide = x_hi - x_lo > 3
+        ra, rb, rc = 0.0, 0.0, 0.0
+        if wide:
+            ra, rb, rc = 1.0 / da, 1.0 / db, 1.0 / dc
         for y in range(y_lo, y_hi + 1):
-            for x in range(x_lo, x_hi + 1):
+            low, high = x_lo, x_hi
+            if wide:
+                wa = (bx * (cy - y) - (by - y) * cx) * sign
+                wb = (cx * (ay - y) - (cy - y) * ax) * sign
+                left, right = _clip(float(x_lo), float(x_hi), wa, da, ra)
+                left, right = _clip(left, right, wb, db, rb)
+                left, right = _clip(left, right, area * sign - wa - wb, dc, rc)
+                if left > right:
+                    continue
+                low, high = int(np.ceil(left)), int(np.floor(right))
+            for x in range(low, high + 1):
                 wa = (bx - x) * (cy - y) - (by - y) * (cx - x)
                 wb = (cx - x) * (ay - y) - (cy - y) * (ax - x)
                 wc = area - wa - wb

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.kernels import explain as kernel
+from hooc_perception.core.kernels import pixel_lists
 from hooc_perception.core.render import closed
 import numpy as np
 
@@ -127,20 +128,23 @@ class Evidence:
                 H, category, me, *self._meshes, context, *self._shared, weights.tolerance_m,
                 weights.normal, weights.category, weights.free, emit_at, pixel, depth, cost)
 
-        stats, n = run(np.full(len(H), -1), np.zeros(0, np.int64), *np.zeros((2, 0), np.float32))
         if not lists:
-            return stats
+            nowhere = np.full(len(H), -1), np.zeros(0, np.int64), *np.zeros((2, 0), np.float32)
+            return run(*nowhere)[0]
+        # Room for all pixels of their windows; what is never written to takes no memory.
+        room = pixel_lists.window_areas(H, category, *self._meshes[:2], self.K, self.R, self.t,
+                                        self.size)
+        starts = np.cumsum(room) - room
+        loose = [np.empty(room.sum(), t) for t in (np.int64, np.float32, np.float32)]
+        stats, n = run(starts, *loose)
         offsets = np.concatenate([[0], np.cumsum(n)])
-        pixel = np.zeros(offsets[-1], np.int64)
-        depth, cost = np.zeros((2, offsets[-1]), np.float32)
-        run(offsets[:-1].copy(), pixel, depth, cost)
-        return stats, PixelLists(offsets, pixel, depth, cost)
+        return stats, PixelLists(offsets, *pixel_lists.packed(starts, offsets, *loose))
 
     def compose(self, members, lists):
         """Return the context that the given rows of PixelLists make, nearest wins."""
         context = tuple(a.copy() for a in self.nothing)
-        kernel.compose(np.asarray(members, np.int64), lists.offsets, lists.pixel, lists.depth,
-                       lists.cost, *context)
+        pixel_lists.compose(np.asarray(members, np.int64), lists.offsets, lists.pixel,
+                            lists.depth, lists.cost, *context)
         return context
 
     def unexplained(self, context=None):

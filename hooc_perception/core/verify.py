@@ -12,6 +12,7 @@ doing without it.
 
 from hooc_perception.core.forest import Forest
 from hooc_perception.core.kernels import explain as kernel
+from hooc_perception.core.kernels.pixel_lists import opinions
 from hooc_perception.errors import HoocError
 import numpy as np
 
@@ -140,7 +141,7 @@ def _category_margin(margin, category):
 def _opinions(evidence, lists, n):
     """Return ((n, N + 1) mean class probabilities, (n,) share of foreground) of the pixels."""
     p, front = np.zeros((n, evidence.p.shape[1])), np.zeros(n)
-    kernel.opinions(lists.offsets, lists.pixel, evidence.p_row, evidence.p, evidence.foreground,
-                    p, front)
+    opinions(lists.offsets, lists.pixel, evidence.p_row, evidence.p, evidence.foreground, p,
+             front)
     covered = np.maximum(np.diff(lists.offsets), 1)
     return p, front / covered

@@ -21,7 +21,7 @@ GROUP = 4
 class FusedScenesConfig(Config):
     """How many scenes the fused forest sees, of what kind, and what is kept of each."""
 
-    scenes: int = param(800, 'Synthetic scenes.', '', 8, 100000)
+    scenes: int = param(1200, 'Synthetic scenes.', '', 8, 100000)
     random_rigs: float = param(0.3, 'Share of scenes seen by another rig of one to four '
                                'cameras; the others by the given one, moved a little. Some '
                                'keep the forest usable on any rig.', '', 0.0, 1.0)

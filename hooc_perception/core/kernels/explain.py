@@ -260,35 +260,3 @@ def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start
                 step = max(0.05, step * 0.93)
         reached[k] = best
     return reached
-
-
-@nb.njit(cache=True)
-def compose(members, offsets, pixel, depth, cost, owner, depth_1, cost_1, depth_2, cost_2):
-    """Write nearest and next member of every pixel into the last five arrays, see explain_one."""
-    for k in members:
-        for e in range(offsets[k], offsets[k + 1]):
-            i = pixel[e]
-            if depth[e] < depth_1[i]:
-                depth_2[i], cost_2[i] = depth_1[i], cost_1[i]
-                depth_1[i], cost_1[i], owner[i] = depth[e], cost[e], k
-            elif depth[e] < depth_2[i]:
-                depth_2[i], cost_2[i] = depth[e], cost[e]
-
-
-@nb.njit(cache=True)
-def opinions(offsets, pixel, p_row, p, foreground, mean_p, front):
-    """
-    Average the class probabilities over the pixels of every row of PixelLists.
-
-    :param mean_p: (n, N + 1) float64, starts with 0; `front` (n,) gets the foreground pixels.
-    """
-    for k in range(len(offsets) - 1):
-        said = 0
-        for e in range(offsets[k], offsets[k + 1]):
-            i = pixel[e]
-            front[k] += foreground[i]
-            if p_row[i] >= 0:
-                said += 1
-                for c in range(p.shape[1]):
-                    mean_p[k, c] += p[p_row[i], c]
-        mean_p[k] /= 255.0 * max(said, 1)

@@ -33,9 +33,6 @@ class ClassifyConfig(Config):
                                  'forest.', '', 0, 200)
     smoothing_angle_rad: float = param(0.8, 'A valley of about this angle between two surface '
                                        'points cuts the spread to 1/e.', 'rad', 0.01, 3.0)
-    sharpness: float = param(1.5, 'Exponent of the probabilities. What is averaged over trees and '
-                             "neighbours is flatter than it has a right to be. Never used by the "
-                             "paper's forest.", '', 0.1, 10.0)
 
 
 def classify(observation, classifier, config=ClassifyConfig()):
@@ -99,6 +96,5 @@ def _fused(observation, pixels, classifier, config):
         p = forest_smooth.spread(
             p, around.voxel[rows], len(around.voxel_points), around.pairs,
             np.exp(-(around.weight / config.smoothing_angle_rad) ** 2), config.smoothing_steps)
-        donor = around.voxel
-    p = p ** np.float32(config.sharpness)
-    return p / np.maximum(p.sum(1, keepdims=True), np.float32(1e-12)), donor
+        return p, around.voxel
+    return p, donor

@@ -43,11 +43,11 @@ def profile(name):
                        propose=ProposeConfig(method='fragments'),
                        parse=ParseConfig(search='genetic', rounds=0))
     if name == 'fast':
-        return Profile('fast',
-                       propose=ProposeConfig(samples=4000, pool=40, refine_steps=12, polish=8,
-                                             polish_steps=6, per_category=8, round_samples=1500,
-                                             round_pool=12, round_per_category=3),
-                       parse=ParseConfig(rounds=1, polish_steps=10, turn_steps=6, patience=3,
+        return Profile('fast', classify=ClassifyConfig(stride=3),
+                       propose=ProposeConfig(samples=2500, pool=30, refine_steps=12, polish=6,
+                                             polish_steps=6, per_category=8, round_samples=1000,
+                                             round_pool=10, round_per_category=3),
+                       parse=ParseConfig(rounds=1, polish_steps=10, turn_steps=6, patience=2,
                                          finalists=4))
     raise HoocError(f'there is no profile {name!r}; choose one of {", ".join(NAMES)}')
 

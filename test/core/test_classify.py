@@ -72,15 +72,6 @@ def test_the_fused_forest_tells_high_from_low(scene, fused):
     assert ((exact.p.argmax(1) == 2) == (z.astype(np.float32) > np.float32(0.05))).all()
 
 
-def test_sharpness_is_an_exponent_and_the_paper_has_none(scene, fused, paper):
-    flat, sharp = (classify(scene, fused, ClassifyConfig(sharpness=g)).p / 255.0 for g in (1, 2))
-    expected = flat ** 2 / (flat ** 2).sum(1, keepdims=True)
-    assert (sharp.max(1) > flat.max(1) + 0.02).any()
-    assert np.abs(sharp - expected).max() < 0.02
-    assert (classify(scene, paper, ClassifyConfig(sharpness=2)).p
-            == classify(scene, paper, ClassifyConfig(sharpness=1)).p).all()
-
-
 def test_any_number_of_views_serves_the_fused_forest(scene, fused):
     for n in (1, 2):
         part = replace(scene, views=scene.views[:n])

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Thinning of pixels, and spreading of probabilities over the surface graph of all views."""
 
-from hooc_perception.core.kernels.forest_texture import neighbours
 import numba as nb
 import numpy as np
 
@@ -79,33 +78,28 @@ def spread(p, voxel, n_voxels, pairs, weight, steps):
     for v in range(n_voxels):
         if count[v] > 0:
             own[v] /= count[v]
-    start, other, w = neighbours(n_voxels, pairs, weight)
-    now, new = own.copy(), np.empty_like(own)
-    known, reached = count > 0, count > 0
+    now, known = own.copy(), count > 0
+    new, total = np.empty_like(own), np.empty(n_voxels, np.float32)
     for _ in range(steps):
-        _step(own, count, start, other, w, now, known, new, reached)
-        now, new = new, now
-        known[:] = reached
+        for v in range(n_voxels):
+            new[v] = own[v]
+            total[v] = 1.0 if count[v] > 0 else 0.0
+        for e in range(pairs.shape[0]):
+            a, b, w = pairs[e, 0], pairs[e, 1], weight[e]
+            if known[b]:
+                for c in range(n_classes):
+                    new[a, c] += w * now[b, c]
+                total[a] += w
+            if known[a]:
+                for c in range(n_classes):
+                    new[b, c] += w * now[a, c]
+                total[b] += w
+        for v in range(n_voxels):
+            if total[v] > 1e-6:
+                known[v] = True
+                for c in range(n_classes):
+                    now[v, c] = new[v, c] / total[v]
     for v in range(n_voxels):
         if not known[v]:
             now[v, 0] = 1.0
     return now
-
-
-@nb.njit(cache=True, parallel=True)
-def _step(own, count, start, other, w, now, known, new, reached):
-    """Write into `new` each voxel's mean with its neighbours; `reached` gets who has one."""
-    for v in nb.prange(own.shape[0]):
-        total = np.float32(1.0 if count[v] > 0 else 0.0)
-        new[v] = own[v]
-        for k in range(start[v], start[v + 1]):
-            if known[other[k]]:
-                total += w[k]
-                for c in range(own.shape[1]):
-                    new[v, c] += w[k] * now[other[k], c]
-        if total > 1e-6:
-            reached[v] = True
-            for c in range(own.shape[1]):
-                new[v, c] /= total
-        else:
-            new[v] = now[v]

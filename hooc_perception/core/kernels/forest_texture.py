@@ -10,7 +10,7 @@ TEXTURE_FEATURES = 7 * len(REACHES)
 
 
 @nb.njit(cache=True)
-def neighbours(m, pairs, weight):
+def _neighbours(m, pairs, weight):
     """Return (start (m + 1,), other, w): the graph as neighbour lists, in the edges' order."""
     start = np.zeros(m + 1, np.int64)
     for e in range(pairs.shape[0]):
@@ -146,7 +146,7 @@ def textures(points, normals, pairs, weight):
         for k in range(6, 9):
             raw[i, k] /= degree[i]
     out = np.empty((m, TEXTURE_FEATURES), np.float32)
-    start, other, w = neighbours(m, pairs, weight)
+    start, other, w = _neighbours(m, pairs, weight)
     now, done = raw.astype(np.float32), 0
     for r in range(len(REACHES)):
         now = _diffuse(now, start, other, w, REACHES[r] - done)

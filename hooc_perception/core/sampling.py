@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from hooc_perception.core.kernels import explain as stat
 from hooc_perception.core.kernels import hypotheses as kernel
+from hooc_perception.core.kernels.distinct import first_unlike
 from hooc_perception.core.memo import per_model
 import numpy as np
 
@@ -109,19 +110,10 @@ def distinct(H, category, score, models, most):
 
     Copies agree in place, orientation and size; the same place with another size is kept.
     """
+    H = np.ascontiguousarray(H[:, :kernel.WIDTH], np.float64)
     rows = []
     for c in np.unique(category):
         mine = np.flatnonzero(category == c)
         mine = mine[np.argsort(-score[mine], kind='stable')]
-        reach, kept = 0.12 * models[c - 1].longest_side, []
-        for i in mine:
-            if len(kept) >= most:
-                break
-            a, b = H[i], H[kept]
-            if not kept or not (
-                    (np.linalg.norm(a[:3] - b[:, :3], axis=1) < reach)
-                    & (np.abs(np.log(a[7:10] / b[:, 7:10])).max(1) < 0.22)
-                    & (np.abs(b[:, 3:7] @ a[3:7]) > 0.92)).any():
-                kept.append(i)
-        rows += kept
-    return np.array(rows, np.int64)
+        rows.append(mine[first_unlike(H[mine], 0.12 * models[c - 1].longest_side, most)])
+    return np.concatenate(rows) if rows else np.zeros(0, np.int64)

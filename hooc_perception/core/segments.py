@@ -2,10 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Split the fused cloud into smooth patches."""
 
+from hooc_perception.core.kernels.patches import smooth_labels
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 
 def smooth_patches(cloud, radius_m=0.009, smooth_cos=0.94, step_m=0.006):
@@ -16,15 +14,8 @@ def smooth_patches(cloud, radius_m=0.009, smooth_cos=0.94, step_m=0.006):
     :param smooth_cos: least cosine of the angle between the normals of neighbours.
     :param step_m: neighbours may lie this far off each other's tangent planes, summed.
     """
-    points, normals = cloud.points, cloud.normals
-    n = len(points)
-    if n < 2:
-        return np.zeros(n, np.int32)
-    pairs = cKDTree(points).query_pairs(radius_m, output_type='ndarray')
-    a, b = pairs[:, 0], pairs[:, 1]
-    step = points[b] - points[a]
-    off = (np.abs(np.einsum('ij,ij->i', step, normals[a]))
-           + np.abs(np.einsum('ij,ij->i', step, normals[b])))
-    smooth = (np.einsum('ij,ij->i', normals[a], normals[b]) > smooth_cos) & (off < step_m)
-    graph = coo_matrix((np.ones(smooth.sum(), np.int8), (a[smooth], b[smooth])), shape=(n, n))
-    return connected_components(graph, directed=False)[1].astype(np.int32)
+    if len(cloud.points) < 2:
+        return np.zeros(len(cloud.points), np.int32)
+    return smooth_labels(np.ascontiguousarray(cloud.points, np.float64),
+                         np.ascontiguousarray(cloud.normals, np.float64), radius_m, smooth_cos,
+                         step_m)

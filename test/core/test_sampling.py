@@ -162,3 +162,20 @@ def test_categories_do_not_compete(things):
 def test_none_wanted_none_given(things):
     H = hypotheses((0, 0, 1), (0.3, 0, 1))
     assert distinct(H, np.ones(2, int), np.zeros(2), things, 0).tolist() == []
+
+
+def test_what_is_left_out_is_what_a_plain_loop_leaves_out(things):
+    rng = np.random.default_rng(8)
+    H = hypotheses(*rng.uniform([-0.03, -0.6, 0.8], [0.03, 0.6, 1.3], (200, 3)))
+    category, score = rng.integers(1, 3, 200), rng.random(200)
+    expected = []
+    for c in (1, 2):
+        kept = []
+        for i in sorted(np.flatnonzero(category == c), key=lambda i: -score[i]):
+            if all(np.linalg.norm(H[i, :3] - H[k, :3]) >= 0.12 * things[c - 1].longest_side
+                   or abs(np.log(H[i, 7] / H[k, 7])) >= 0.22
+                   or abs(H[i, 3:7] @ H[k, 3:7]) <= 0.92 for k in kept):
+                kept.append(i)
+        expected += kept[:12]
+    assert 8 < len(expected) < 25
+    assert distinct(H, category, score, things, 12).tolist() == expected

@@ -3,6 +3,7 @@
 """Voxel graph of the foreground, its convex segments, and their shape measures."""
 
 from hooc_perception.core.kernels.forest_texture import normal_shape
+from hooc_perception.core.kernels.patches import root
 import numba as nb
 import numpy as np
 
@@ -104,14 +105,6 @@ def edges(mean, normal, grid, origin, cell):
 
 
 @nb.njit(cache=True)
-def _root(parent, i):
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
-
-
-@nb.njit(cache=True)
 def segment(n, pairs, weight, order, k, smallest):
     """
     Return (n,) int32 segment ids 0.. by graph merging (Felzenszwalb and Huttenlocher 2004).
@@ -126,7 +119,7 @@ def segment(n, pairs, weight, order, k, smallest):
     inner = np.zeros(n, np.float32)
     for round_ in range(2):
         for e in order:
-            a, b = _root(parent, pairs[e, 0]), _root(parent, pairs[e, 1])
+            a, b = root(parent, pairs[e, 0]), root(parent, pairs[e, 1])
             if a == b:
                 continue
             w = weight[e]
@@ -143,7 +136,7 @@ def segment(n, pairs, weight, order, k, smallest):
     out = np.empty(n, np.int32)
     m = 0
     for i in range(n):
-        r = _root(parent, i)
+        r = root(parent, i)
         if ids[r] < 0:
             ids[r] = m
             m += 1

@@ -6,9 +6,9 @@ import numba as nb
 import numpy as np
 
 
-@nb.njit(cache=True, inline='always')
-def _root(parent, i):
-    """Return the first point of the patch of point i, and shorten the way there."""
+@nb.njit(cache=True)
+def root(parent, i):
+    """Return the first member of the part that `i` is joined to, and shorten the way there."""
     while parent[i] != i:
         parent[i] = parent[parent[i]]
         i = parent[i]
@@ -57,14 +57,14 @@ def smooth_labels(points, normals, radius, smooth_cos, step):
                         dot += normals[i, k] * normals[j, k]
                     if (apart <= radius * radius and dot > smooth_cos
                             and abs(along_i) + abs(along_j) < step):
-                        a, b = _root(parent, i), _root(parent, j)
+                        a, b = root(parent, i), root(parent, j)
                         parent[max(a, b)] = min(a, b)
     labels, known = np.empty(n, np.int32), 0
     for i in range(n):
-        root = _root(parent, i)
-        if root == i:
+        first = root(parent, i)
+        if first == i:
             labels[i] = known
             known += 1
         else:
-            labels[i] = labels[root]
+            labels[i] = labels[first]
     return labels

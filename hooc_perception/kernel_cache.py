@@ -54,10 +54,10 @@ def drop_stale(environment=os.environ, package=Path(__file__).parent):
     numba compiles a kernel anew where its own file has changed, not where a kernel of another
     file that it calls has: after an update, old code would run inside of new.
     """
-    sources = sorted((package / 'core/kernels').glob('*.py'))
     now = hashlib.sha256()
-    for source in sources:
-        now.update(f'{source} {source.stat().st_mtime_ns} {source.stat().st_size}\n'.encode())
+    for source in sorted((package / 'core/kernels').glob('*.py')):
+        state = source.stat()
+        now.update(f'{source} {state.st_mtime_ns} {state.st_size}\n'.encode())
     root, folders = _place(environment, package)
     # In the package's own cache folder, which git and builds leave out.
     stamp = root / '__pycache__' / f'{package.name}.sources'

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.kernels import explain as kernel
 from hooc_perception.core.kernels import pixel_lists
-from hooc_perception.core.render import closed
+from hooc_perception.core.render import is_closed
 import numpy as np
 
 
@@ -46,8 +46,8 @@ class PixelLists:
         """Return the lists of the given rows."""
         n = np.diff(self.offsets)[rows]
         at = np.concatenate([[0], np.cumsum(n)])
-        index = np.repeat(self.offsets[:-1][rows] - at[:-1], n) + np.arange(at[-1])
-        return PixelLists(at, self.pixel[index], self.depth[index], self.cost[index])
+        return PixelLists(at, *pixel_lists.packed(self.offsets[:-1][rows], at, self.pixel,
+                                                  self.depth, self.cost))
 
     def extended(self, other):
         """Return these rows followed by those of `other`."""
@@ -106,7 +106,7 @@ class Evidence:
                         self.foreground, self.normals, self.patch, self.patch_size, self.p,
                         self.p_row)
         self._meshes = (self.vertices, self.vertex_start, self.faces, self.face_start,
-                        np.array([closed(m) for m in models]))
+                        np.array([is_closed(m) for m in models]))
 
     def explain(self, hypotheses, category, weights, context=None, lists=False, me=None):
         """

@@ -52,7 +52,7 @@ def render_patch(vertices_world, faces, camera):
 
 
 @per_model
-def closed(model):
+def is_closed(model):
     """
     Return whether a GenericModel is made of closed surfaces that are all wound outwards.
 

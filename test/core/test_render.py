@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from hooc_perception.core.geometry import inverse, rays, transform
 from hooc_perception.core.kernels.raster import draw, NEAR_M
-from hooc_perception.core.render import closed, projected, render_depth, render_patch
+from hooc_perception.core.render import is_closed, projected, render_depth, render_patch
 import numpy as np
 import open3d
 import pytest
@@ -152,16 +152,16 @@ def test_faces_turned_away_from_the_camera_change_no_picture_of_a_closed_mesh(de
 def test_a_mesh_is_closed_where_every_edge_has_its_counterpart_and_each_part_faces_outwards(
         things):
     model = things[0]
-    assert all(closed(m) for m in things)
+    assert all(is_closed(m) for m in things)
     n = len(model.vertices)
     far = np.concatenate([model.vertices, model.vertices + 1.0])
     twice = np.concatenate([model.faces, model.faces + n]).astype(np.int32)
     inverted = np.concatenate([model.faces, model.faces[:, ::-1] + n]).astype(np.int32)
-    assert closed(replace(model, vertices=far, faces=twice))
+    assert is_closed(replace(model, vertices=far, faces=twice))
     for name, bad in (('open', replace(model, faces=model.faces[1:])),
                       ('wound inwards', replace(model, faces=model.faces[:, ::-1])),
                       ('one part inwards', replace(model, vertices=far, faces=inverted)),
                       ('one face turned over', replace(model, faces=np.concatenate(
                           [model.faces[:1, ::-1], model.faces[1:]]))),
                       ('no face', replace(model, faces=model.faces[:0]))):
-        assert not closed(bad), name
+        assert not is_closed(bad), name

@@ -82,10 +82,8 @@ def explain_one(h, category, vertices, faces, closed, me, context, K, R_cw, t_cw
     n_touched = 0
     for v in range(K.shape[0]):
         agreed = stats[AGREE]
-        w, height = size[v, 0], size[v, 1]
-        uvz = raster.project_vertices(world, R_cw[v], t_cw[v], K[v, 0, 0], K[v, 1, 1],
-                                      K[v, 0, 2], K[v, 1, 2])
-        u0, v0, u1, v1 = raster.bounding_window(uvz, w, height)
+        w = size[v, 0]
+        uvz, (u0, v0, u1, v1) = raster.in_view(world, R_cw[v], t_cw[v], K[v], size[v])
         if u1 <= u0 or v1 <= v0:
             continue
         z = np.full((v1 - v0, u1 - u0), np.inf, np.float32)

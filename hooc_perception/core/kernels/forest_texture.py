@@ -97,7 +97,7 @@ def normal_shape(tensor, out):
         tensor[0], tensor[1], tensor[2], tensor[3], tensor[4], tensor[5])
     a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
     eigen(a, v)
-    low, high = 0, 0
+    low, high = 0, 0        # they stay together only where nothing is a number
     for k in range(1, 3):
         low = k if a[k, k] < a[low, low] else low
         high = k if a[k, k] >= a[high, high] else high

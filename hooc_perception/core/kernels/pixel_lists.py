@@ -17,9 +17,7 @@ def window_areas(H, category, vertices, vertex_start, K, R_cw, t_cw, size):
         world = np.empty(V.shape)
         posed(H[k], V, world)
         for v in range(K.shape[0]):
-            uvz = raster.project_vertices(world, R_cw[v], t_cw[v], K[v, 0, 0], K[v, 1, 1],
-                                          K[v, 0, 2], K[v, 1, 2])
-            u0, v0, u1, v1 = raster.bounding_window(uvz, size[v, 0], size[v, 1])
+            u0, v0, u1, v1 = raster.in_view(world, R_cw[v], t_cw[v], K[v], size[v])[1]
             out[k] += (u1 - u0) * (v1 - v0)
     return out
 

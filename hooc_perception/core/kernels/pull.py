@@ -34,7 +34,7 @@ def multiply(a, b, out):
 @nb.njit(cache=True, inline='always')
 def accumulate(A, h, R, x, y, z, nx, ny, nz, residual, weight):
     """
-    Add a point's equation to A (9, 10): upper triangle of J^T J, J^T r in the last column.
+    Add a point's equation to A (9, 10): J^T J, and J^T r in the last column.
 
     :param h: the hypothesis, R its rotation; (x, y, z) the model point, world.
     :param residual: metres along the measured normal (nx, ny, nz).
@@ -50,14 +50,14 @@ def accumulate(A, h, R, x, y, z, nx, ny, nz, residual, weight):
           * (R[0, 2] * px + R[1, 2] * py + R[2, 2] * pz))
     # Called for every pixel of every trial: loops over a tuple take four times as long.
     _add(A, 0, weight * nx, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 1, weight * ny, 0.0, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 2, weight * nz, 0.0, 0.0, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 3, weight * j3, 0.0, 0.0, 0.0, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 4, weight * j4, 0.0, 0.0, 0.0, 0.0, j4, j5, j6, j7, j8, residual)
-    _add(A, 5, weight * j5, 0.0, 0.0, 0.0, 0.0, 0.0, j5, j6, j7, j8, residual)
-    _add(A, 6, weight * j6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, j6, j7, j8, residual)
-    _add(A, 7, weight * j7, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, j7, j8, residual)
-    _add(A, 8, weight * j8, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, j8, residual)
+    _add(A, 1, weight * ny, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 2, weight * nz, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 3, weight * j3, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 4, weight * j4, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 5, weight * j5, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 6, weight * j6, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 7, weight * j7, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add(A, 8, weight * j8, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
 
 
 @nb.njit(cache=True, inline='always')

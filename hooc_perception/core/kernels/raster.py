@@ -102,6 +102,14 @@ def draw(uvz, faces, label, u0, v0, depth, labels, closed=False):
 
 
 @nb.njit(cache=True)
+def in_view(vertices_world, R_camera_world, t_camera_world, K, size):
+    """Return (projected vertices, their window) in a view of `size` (2,) width and height."""
+    uvz = project_vertices(vertices_world, R_camera_world, t_camera_world, K[0, 0], K[1, 1],
+                           K[0, 2], K[1, 2])
+    return uvz, bounding_window(uvz, size[0], size[1])
+
+
+@nb.njit(cache=True)
 def bounding_window(uvz, width, height):
     """Return (u0, v0, u1, v1), the half-open pixel window of a projected mesh, clipped."""
     u_lo, v_lo, u_hi, v_hi = 1e9, 1e9, -1e9, -1e9

@@ -19,7 +19,7 @@ from hooc_perception.core.verify import Verifier
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
-from hooc_perception.ros.adapters.choose import AdapterConfig, adapters_of
+from hooc_perception.ros.adapters.choose import AdapterConfig, adapters_of, tell
 from hooc_perception.ros.detect_service import DetectService
 from hooc_perception.ros.found import found_scene
 from hooc_perception.ros.object_output import ObjectOutput
@@ -56,6 +56,8 @@ class ParsingNode(StageNode):
     def __init__(self, **kwargs):
         """Declare parameters."""
         super().__init__('parsing_node', ParsingConfig(), ('observe', 'parse'), **kwargs)
+        self.detect = DetectService(self, lambda: None if self.enabled else (
+            'frame sets are ignored: call enable with true'))
 
     def configure(self):
         """Load the generic models, build the endpoints."""
@@ -74,8 +76,6 @@ class ParsingNode(StageNode):
             'poses': (PoseArray, 'candidates/poses'),
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set)
         self.more = MoreCandidates(self)
-        self.detect = DetectService(self, lambda: None if self.enabled else (
-            'frame sets are ignored: call enable with true'))
         self.adapters = adapters_of(self)
         self.answered = None        # monotonic s of the answer that stands, None: there is none
         self.steady_timer(0.5, self.on_timer)
@@ -95,10 +95,13 @@ class ParsingNode(StageNode):
         self.output.announce()
 
     def deactivate(self):
-        """Take back what other packages keep, and let nobody wait."""
+        """Take back the answer, which nobody watches any more, and let nobody wait."""
         self.detect.fail('the node was deactivated')
-        for adapter in self.adapters:
-            adapter.clear(self.now_ns(), self.config.target_frame)
+        self.take_back()
+
+    def cleanup(self):
+        """Begin anew with the next configuration."""
+        self.detect.forget()
 
     def on_set(self, stamp_ns, observation, messages):
         """Parse one frame set."""
@@ -128,11 +131,10 @@ class ParsingNode(StageNode):
         parsed = replace(parsed, objects=objects)
         left = unexplained_points(observation, objects, self.models)
         scene = found_scene(parsed, ids, self.models, stamp_ns, self.config.target_frame)
-        for adapter in self.adapters:
-            adapter.publish(scene)
         age_s = (self.now_ns() - stamp_ns) * 1e-9
         self.output.publish(parsed, ids, stamp_ns, self.config.target_frame, age_s, left)
         self.answered = time.monotonic()
+        tell(self, self.adapters, 'publish', scene)
         self.detect.answer(scene)
         self.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
                             energy=float(parsed.energy.total), age_s=age_s)
@@ -166,8 +168,9 @@ class ParsingNode(StageNode):
     def take_back(self):
         """Publish that nothing is known any more; ids stay with what returns in time."""
         self.answered = None
-        for each in (*self.adapters, self.output):
-            each.clear(self.now_ns(), self.config.target_frame)
+        now = self.now_ns(), self.config.target_frame
+        self.output.clear(*now)
+        tell(self, self.adapters, 'clear', *now)
 
 
 def main(args=None):

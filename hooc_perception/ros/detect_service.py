@@ -29,25 +29,24 @@ class DetectService:
     The callback is a coroutine in a group of its own: while it waits, the node works on. The
     deadline is kept by the steady clock: simulated time may stand still.
 
-    :param refusal: callable that returns why no answer can come, or None.
+    The service lives as long as its node, in every lifecycle state: who waits is answered after
+    the transition that ended the waiting, and who calls a node that is not active learns it.
+
+    :param refusal: callable that returns why no answer of the active node can come, or None.
     """
 
     def __init__(self, node, refusal=lambda: None):
         """Offer `detect` on a StageNode whose config has detect_timeout_s."""
         self._node, self._refusal = node, refusal
         self._waiting, self._last_ns = [], None
-        node.owned(node.destroy_service, node.create_service(
-            Trigger, 'detect', self._on_call, callback_group=ReentrantCallbackGroup()))
-        node.owned(node.destroy_timer, node.create_timer(
-            0.2, self._give_up, clock=Clock(clock_type=ClockType.STEADY_TIME)))
-        node.owned(lambda _: self.fail('the node is being cleaned up'), None)
+        node.create_service(Trigger, 'detect', self._on_call,
+                            callback_group=ReentrantCallbackGroup())
+        node.create_timer(0.2, self._give_up, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     async def _on_call(self, request, response):
-        reason = self._refusal()
-        if not self._node.active:
-            reason = 'the node is not active: activate it'
+        reason = self._refusal() if self._node.active else 'the node is not active: activate it'
         if reason:
-            response.success, response.message = False, reason
+            response.success, response.message = False, refusal_json(reason)
             return response
         call = _Call(self._node.now_ns(),
                      time.monotonic() + self._node.config.detect_timeout_s, Future())
@@ -71,13 +70,17 @@ class DetectService:
     def fail(self, reason):
         """Tell everybody who waits that no answer will come."""
         while self._waiting:
-            self._waiting.pop().future.set_result((False, reason))
+            self._waiting.pop().future.set_result((False, refusal_json(reason)))
+
+    def forget(self):
+        """Forget when the last frame set was taken."""
+        self._last_ns = None
 
     def _give_up(self):
         now = time.monotonic()
         for call in [c for c in self._waiting if c.deadline < now]:
             self._waiting.remove(call)
-            call.future.set_result((False, self._complaint(call)))
+            call.future.set_result((False, refusal_json(self._complaint(call))))
 
     def _complaint(self, call):
         text = 'no frame set newer than the call was parsed in time: '
@@ -87,6 +90,11 @@ class DetectService:
         return text + (f'the last one was taken {age_s:.1f} s before; look at /diagnostics for '
                        'cameras that do not deliver, and set use_sim_time where a bag keeps its '
                        'own stamps')
+
+
+def refusal_json(reason):
+    """Return the JSON that `detect` answers where there is no scene to tell of."""
+    return json.dumps({'error': reason})
 
 
 def scene_json(scene):

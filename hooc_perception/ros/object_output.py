@@ -75,17 +75,22 @@ class ObjectOutput:
         self._attributes.publish(cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head))
         for publisher in self._by_category:
             publisher.publish(PoseArray(header=head))
-        self._markers.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
-        self._shown = set()
+        # What a predecessor that died has left in a viewer goes with DELETEALL.
+        self._markers.publish(MarkerArray(markers=[
+            *self._deleted(set(), head), Marker(header=head, action=Marker.DELETEALL)]))
         self._unexplained.publish(points_message(none, head))
+        self._summary.publish(String(data=summary_json(None, stamp_ns)))
         self._poses.publish(PoseArray(header=head))
+
+    def _deleted(self, now, head):
+        """Return a DELETE for each (ns, id) that was shown and is not in `now`; remember `now`."""
+        gone, self._shown = sorted(self._shown - now), now
+        return [Marker(header=head, ns=ns, id=number, action=Marker.DELETE) for ns, number in gone]
 
     def _markers_message(self, poses, found, ids, head):
         """Return DELETE for what was shown and is gone, ADD for what stands there now."""
-        now = {(self.models[c - 1].name, int(number)) for c, number in zip(found.category, ids)}
-        markers = [Marker(header=head, ns=ns, id=number, action=Marker.DELETE)
-                   for ns, number in sorted(self._shown - now)]
-        self._shown = now
+        markers = self._deleted({(self.models[c - 1].name, int(number))
+                                 for c, number in zip(found.category, ids)}, head)
         for i, number in enumerate(ids):
             class_id = int(found.category[i])
             model = self.models[class_id - 1]
@@ -102,11 +107,11 @@ class ObjectOutput:
 
 
 def summary_json(parsed, stamp_ns):
-    """Return the text of `scene/summary`: how the answer came about."""
-    energy = parsed.energy
+    """Return the text of `scene/summary`: how the answer came about; None: there is no answer."""
+    energy = {name: parsed and float(getattr(parsed.energy, name))
+              for name in ('total', 'depth', 'probability', 'overlap')}
     return json.dumps({
-        'format': 'hooc-summary/1', 'stamp_ns': stamp_ns,
-        'energy': {'total': float(energy.total), 'depth': float(energy.depth),
-                   'probability': float(energy.probability), 'overlap': float(energy.overlap)},
-        'converged': bool(parsed.converged), 'candidates': len(parsed.pool),
-        'seconds': {name: float(s) for name, s in parsed.seconds.items()}})
+        'format': 'hooc-summary/1', 'stamp_ns': stamp_ns, 'energy': energy,
+        'converged': bool(parsed and parsed.converged),
+        'candidates': len(parsed.pool) if parsed else 0,
+        'seconds': {name: float(s) for name, s in parsed.seconds.items()} if parsed else {}})

@@ -2,26 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the lifecycle nodes share: parameters, transitions that explain failures, endpoints."""
 
-import ctypes
 from dataclasses import dataclass, field
 import functools
-import gc
 import json
 import os
-import sys
 import time
 import traceback
 
 from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.diagnostics import Diagnostics
+from hooc_perception.ros.memory import give_back_memory
 from hooc_perception.ros.misaddressed import misaddressed
 from hooc_perception.ros.parameters import Parameters
 from hooc_perception.ros.qos import overridable, qos
 from rclpy.clock import Clock, ClockType
+from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
 PROFILES = ('paper', 'best', 'fast')
+# What a node says last goes with its publishers: so long may its arrival take.
+FAREWELL_S = 1.0
 
 
 def fixed_param(*args, **kwargs):
@@ -128,22 +129,26 @@ class StageNode(LifecycleNode):
         made = self.create_timer(seconds, callback, clock=Clock(clock_type=ClockType.STEADY_TIME))
         return self.owned(self.destroy_timer, made)
 
-    def guarded(self, callback):
+    def guarded(self, callback, thing='input', loss='the message is dropped'):
         """
-        Return a callback of one message that survives whatever the message causes.
+        Return a callback that survives whatever happens in it; it returns whether all went well.
 
         A node runs for days: an error that nobody has thought of costs one message, is said and
         counted, and its traceback logged.
+
+        :param thing, loss: what /diagnostics names, and what the error costs.
         """
         @functools.wraps(callback)
-        def survive(message):
+        def survive(*args):
             try:
-                callback(message)
+                callback(*args)
+                return True
             except Exception as error:
-                self.diagnostics.error('input', 'unexpected', (
-                    f'unexpected {type(error).__name__}: {error}; the message is dropped; please '
-                    'report this with the traceback'))
+                self.diagnostics.error(thing, 'unexpected', (
+                    f'unexpected {type(error).__name__}: {error}; {loss}; please report this '
+                    'with the traceback'))
                 self.get_logger().info(traceback.format_exc(), throttle_duration_sec=60.0)
+                return False
         return survive
 
     # Hooks of the sub-classes.
@@ -182,13 +187,14 @@ class StageNode(LifecycleNode):
             LifecycleNode.on_activate(self, state)
             self.activate()
             self.active = True
-        done = self._attempt('activate', start)
-        return TransitionCallbackReturn.SUCCESS if done else TransitionCallbackReturn.FAILURE
+        if self._attempt('activate', start):
+            return TransitionCallbackReturn.SUCCESS
+        LifecycleNode.on_deactivate(self, state)    # a node that stays inactive is silent
+        return TransitionCallbackReturn.FAILURE
 
     def on_deactivate(self, state):
         """Silence the node; what was built stays."""
-        self.active = False
-        self._attempt('deactivate', self.deactivate)
+        self._stop()
         return LifecycleNode.on_deactivate(self, state)
 
     def on_cleanup(self, state):
@@ -198,15 +204,30 @@ class StageNode(LifecycleNode):
 
     def on_shutdown(self, state):
         """Stop for good."""
-        self.active = False
+        self.leave()
         self._destroy()
         return TransitionCallbackReturn.SUCCESS
 
     def on_error(self, state):
         """Fall back to unconfigured, from where one can try again."""
-        self.active = False
+        self.leave()
         self._destroy()
         return TransitionCallbackReturn.SUCCESS
+
+    def leave(self):
+        """Do what deactivating does if the node is active, and let it arrive everywhere."""
+        if self._stop():
+            deadline = time.monotonic() + FAREWELL_S
+            for publisher in self.publishers:
+                publisher.wait_for_all_acked(Duration(
+                    seconds=max(0.0, deadline - time.monotonic())))
+
+    def _stop(self):
+        """Deactivate while the publishers still speak; return whether the node was active."""
+        was, self.active = self.active, False
+        if was:
+            self._attempt('deactivate', self.deactivate)
+        return was
 
     def _attempt(self, what, step):
         """Return whether `step()` went through; log the sentence or the surprise otherwise."""
@@ -238,14 +259,4 @@ class StageNode(LifecycleNode):
         for name in set(vars(self)) - self._before:
             if not name.startswith('_'):
                 delattr(self, name)
-        gc.collect()
-        _trim()
-
-
-def _trim():
-    """Have the C library give free memory back to the system, where it can."""
-    if sys.platform == 'linux':
-        try:
-            ctypes.CDLL('libc.so.6').malloc_trim(0)
-        except (OSError, AttributeError):
-            pass    # another C library
+        give_back_memory()

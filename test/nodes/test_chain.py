@@ -352,7 +352,7 @@ def test_enable_and_reset(chain):
     send()
     assert bench.spin(lambda: heard['objects/poses'] and heard['objects/markers'])
     assert bench.spin(call(bench, Trigger, 'reset').done)
-    assert bench.spin(lambda: heard['objects/markers'][-1].markers[0].action == Marker.DELETEALL)
+    assert bench.spin(lambda: heard['objects/markers'][-1].markers[-1].action == Marker.DELETEALL)
     # Who acts on the answer learns that it is void, in every form that it has.
     assert bench.spin(lambda: heard['objects/poses'][-1].poses == [])
     assert heard['objects/attributes'][-1].width == 0

@@ -75,6 +75,9 @@ class Node:
     def owned(self, destroy, made):
         return made
 
+    def guarded(self, callback, thing, loss):
+        return callback
+
     destroy_timer = None
 
 

@@ -39,3 +39,15 @@ def adapters_of(node):
     if config.planning_scene != 'off':
         chosen.append(PlanningSceneDiffs(node, config.planning_scene))
     return chosen
+
+
+def tell(node, adapters, what, *args):
+    """
+    Have adapters `publish` or `clear`; what fails costs neither the other ones nor the answer.
+
+    :param what: name of the method; `args` go to it.
+    """
+    for adapter in adapters:
+        thing = type(adapter).__name__
+        if node.guarded(getattr(adapter, what), thing, f'its {what} is left out')(*args):
+            node.diagnostics.ok(thing)

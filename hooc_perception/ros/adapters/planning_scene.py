@@ -28,7 +28,8 @@ class PlanningSceneDiffs:
         self._publisher = node.publisher(self._messages.PlanningScene, '/planning_scene')
         self._seen = {}     # name -> node time (ns) of the last answer that shows it
         self._frame = node.config.target_frame
-        node.owned(node.destroy_timer, node.create_timer(CHECK_S, self.expire))
+        node.owned(node.destroy_timer, node.create_timer(CHECK_S, node.guarded(
+            self.expire, type(self).__name__, 'what is gone stays in the planning scene')))
 
     def publish(self, scene):
         """Add or replace the objects of a FoundScene and remove those whose time is over."""

@@ -1,0 +1,197 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Nothing that the parsing node has said outlives its watching, whatever ends that."""
+
+import json
+from types import SimpleNamespace
+
+from hooc_perception.models.derive import derive
+from hooc_perception.models.folder import save_model_folder
+import numpy as np
+import pytest
+import trimesh
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.core.observe import observe  # noqa: E402
+from hooc_perception.core.types import Energy, ParsedScene  # noqa: E402
+from hooc_perception.nodes import parsing_node  # noqa: E402
+from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera  # noqa: E402
+from hooc_perception.ros import conversions as c  # noqa: E402
+from hooc_perception.ros.qos import qos  # noqa: E402
+from hooc_perception.ros.stage_messages import (  # noqa: E402
+    candidates_messages,
+    probabilities_message,
+)
+from lifecycle_msgs.msg import Transition  # noqa: E402
+from lifecycle_msgs.srv import ChangeState  # noqa: E402
+from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
+from sensor_msgs.msg import PointCloud2  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
+from std_srvs.srv import Trigger  # noqa: E402
+from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
+
+SUCCESS = TransitionCallbackReturn.SUCCESS
+STAMP = 1_700_000_000_250_000_000
+ENDS = {'deactivate': Transition.TRANSITION_DEACTIVATE,
+        'shutdown': Transition.TRANSITION_ACTIVE_SHUTDOWN}
+KINDS = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
+         'objects/labels': String, 'objects/markers': MarkerArray, 'scene/summary': String,
+         'scene/unexplained': PointCloud2, 'objects/box/poses': PoseArray,
+         'objects/can/poses': PoseArray}
+
+
+class Adapter:
+    """Another package's view of the answer, which may break."""
+
+    def __init__(self):
+        self.told, self.broken = [], False
+
+    def publish(self, scene):
+        self.told.append(len(scene.objects))
+        assert not self.broken, 'no such frame'
+
+    def clear(self, stamp_ns, frame):
+        self.told.append('clear')
+        assert not self.broken, 'no such frame'
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory):
+    """Return the ModelFolder of a box and a can, seen by one small camera."""
+    rng = np.random.default_rng(0)
+    meshes = {'box': trimesh.creation.box((0.1, 0.06, 0.08)),
+              'can': trimesh.creation.cylinder(0.04, 0.12)}
+    models = [derive(name, mesh, rng, 200, 100) for name, mesh in meshes.items()]
+    return save_model_folder(tmp_path_factory.mktemp('model') / 'm', 'm', models,
+                             {'kind': np.zeros(1)}, 'fast', 3, (overhead_camera(),), 1)
+
+
+@pytest.fixture
+def parsing(bench, folder, monkeypatch):
+    """Return an active node that found a box and a can, what a subscriber heard, an adapter."""
+    views, p, pool, models = made_up_scene(folder.models, folder.cameras)
+    adapter, observation, some = Adapter(), observe(views), np.ones(2, np.float32)
+    parsed = ParsedScene(pool.take([0, 1]), Energy(0.5, 0.25, 0.125), some, some, some,
+                         np.full(2, 2, np.uint8), pool)
+    monkeypatch.setattr(parsing_node, 'parse', lambda *args: parsed)
+    monkeypatch.setattr(parsing_node, 'adapters_of', lambda node: [adapter])
+    node = bench.add(parsing_node.ParsingNode, model=str(folder.path), warm_up=False,
+                     sigmas=False)
+    head = c.header(STAMP, 'table')
+    poses, attributes = candidates_messages(pool, head)
+    messages = {'probabilities': probabilities_message(p, observation,
+                                                       [m.name for m in models], head),
+                'poses': poses, 'attributes': attributes}
+    heard = listen(bench)
+
+    def look():
+        node.on_set(STAMP, observation, messages)
+        assert bench.spin(lambda: all(heard.values())
+                          and len(heard['objects/poses'][-1].poses) == 2)
+    assert node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
+    look()
+    return SimpleNamespace(node=node, heard=heard, adapter=adapter, look=look)
+
+
+def listen(bench):
+    """Return {topic: messages}, the latched ones and those to come."""
+    return {topic: bench.hear(kind, topic, qos(
+        topic if topic.count('/') == 1 else 'objects/<category>/poses'))
+        for topic, kind in KINDS.items()}
+
+
+def is_taken_back(heard):
+    """Return whether the last messages say that nothing is known, in every form."""
+    if not all(heard.values()):
+        return False
+    last = {topic: messages[-1] for topic, messages in heard.items()}
+    summary = json.loads(last['scene/summary'].data)
+    return (all(message.poses == [] for topic, message in last.items() if 'poses' in topic)
+            and last['objects/attributes'].width == last['scene/unexplained'].width == 0
+            and json.loads(last['objects/labels'].data)['objects'] == {}
+            and all(m.action != Marker.ADD for m in last['objects/markers'].markers)
+            and summary['energy']['total'] is None and summary['candidates'] == 0)
+
+
+def change(bench, transition):
+    """Return the future of a transition that is asked for from outside."""
+    return call(bench, ChangeState, 'parsing_node/change_state',
+                transition=Transition(id=transition))
+
+
+def call(bench, kind, name, **fields):
+    """Return the future of a service call."""
+    client = bench.peer.create_client(kind, name)
+    assert bench.spin(client.service_is_ready)
+    return client.call_async(kind.Request(**fields))
+
+
+def test_deactivating_empties_what_is_latched(bench, parsing):
+    assert parsing.node.trigger_deactivate() == SUCCESS
+    assert bench.spin(lambda: is_taken_back(parsing.heard))
+    late = listen(bench)
+    assert bench.spin(lambda: is_taken_back(late))
+    assert all(len(messages) == 1 for messages in late.values())
+    # The frame set of the old answer is not new after a second activation, either.
+    assert parsing.node.trigger_activate() == SUCCESS
+    bench.rest(0.2)
+    assert is_taken_back(parsing.heard)
+    assert parsing.node.trigger_deactivate() == SUCCESS
+    assert parsing.node.trigger_cleanup() == SUCCESS
+    bench.rest(0.2)
+    assert is_taken_back(parsing.heard)
+
+
+@pytest.mark.parametrize('end', ['trigger_shutdown', 'on_error'])
+def test_the_end_takes_back_what_other_packages_hold(bench, parsing, end):
+    act = getattr(parsing.node, end)
+    assert (act() if end == 'trigger_shutdown' else act(None)) == SUCCESS
+    assert parsing.adapter.told == [2, 'clear']
+    assert bench.spin(lambda: is_taken_back(parsing.heard))
+
+
+def test_markers_are_deleted_one_by_one(bench, parsing):
+    shown = {(m.ns, m.id) for m in parsing.heard['objects/markers'][-1].markers}
+    assert bench.spin(call(bench, Trigger, 'reset').done)
+    assert bench.spin(lambda: is_taken_back(parsing.heard))
+    *deleted, rest = parsing.heard['objects/markers'][-1].markers
+    assert {(m.ns, m.id) for m in deleted} == shown and len(shown) == 2
+    assert all(m.action == Marker.DELETE and m.header.frame_id == 'table' for m in deleted)
+    assert rest.action == Marker.DELETEALL and rest.header.frame_id == 'table'
+
+
+@pytest.mark.parametrize('end', ['deactivate', 'cleanup', 'shutdown'])
+def test_who_waits_for_detect_is_told_of_the_end(bench, parsing, end):
+    waiting = call(bench, Trigger, 'detect')
+    assert bench.spin(lambda: parsing.node.detect._waiting)
+    if end == 'cleanup':
+        # At once: the reply has not left the node yet when everything goes.
+        assert parsing.node.trigger_deactivate() == SUCCESS
+        assert parsing.node.trigger_cleanup() == SUCCESS
+    else:
+        ended = change(bench, ENDS[end])
+        assert bench.spin(ended.done) and ended.result().success
+    assert bench.spin(waiting.done)
+    assert not waiting.result().success
+    assert 'deactivated' in json.loads(waiting.result().message)['error']
+    # Nor does anybody wait for a node that will not look again.
+    refused = call(bench, Trigger, 'detect')
+    assert bench.spin(refused.done)
+    assert not refused.result().success and 'not active' in refused.result().message
+
+
+def test_a_broken_adapter_costs_neither_the_answer_nor_the_others(bench, parsing):
+    node, other = parsing.node, Adapter()
+    node.adapters.append(other)
+    parsing.adapter.broken = True
+    for messages in parsing.heard.values():
+        messages.clear()
+    parsing.look()
+    assert other.told == [2]
+    code, sentence = bench.reasons(node)['Adapter']
+    assert code == 'unexpected' and 'no such frame' in sentence
+    assert node.trigger_deactivate() == SUCCESS
+    assert other.told == [2, 'clear'] and parsing.adapter.told[-1] == 'clear'
+    assert bench.spin(lambda: is_taken_back(parsing.heard))

@@ -23,6 +23,7 @@ import shutil
 import tempfile
 import zipfile
 
+from hooc_perception.core.names import check_categories
 from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -74,7 +75,8 @@ def save_model_folder(path, name, models, classifier, profile, seed, cameras, ma
 
     An older MODEL folder at `path` is replaced; anything else there is left alone.
 
-    :raises HoocError: the path is taken, a name is unfit for a file, or an array is no numbers.
+    :raises HoocError: the path is taken, a name is unfit for a file, two categories would share
+        a topic, or an array is no numbers.
     """
     path = Path(path)
     if path.exists() and not (path / 'model.json').is_file() and not (
@@ -85,6 +87,7 @@ def save_model_folder(path, name, models, classifier, profile, seed, cameras, ma
         _check_name(item, path)
     if len({n.lower() for n in names}) != len(names):
         raise HoocError(f'two categories of {path} have the same name; rename one')
+    check_categories(names, path)
     path.parent.mkdir(parents=True, exist_ok=True)
     building = Path(tempfile.mkdtemp(prefix=f'.{path.name}-', dir=path.parent))
     try:
@@ -122,6 +125,7 @@ def load_model_folder(path):
         raise HoocError(f'{path}/model.json lacks or garbles the field {e}; train again') from e
     for item in [*names, *keys]:
         _check_name(item, path)
+    check_categories(names, f'{path}/model.json')
     wanted = ['models.npz', *(f'meshes/{n}.ply' for n in names),
               *(f'classifier/{k}.npy' for k in keys)]
     for file in wanted:

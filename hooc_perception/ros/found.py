@@ -3,17 +3,11 @@
 """One answer as every way out of the parsing node takes it: services, tf2, MoveIt, vision_msgs."""
 
 from dataclasses import dataclass
-import re
 
+from hooc_perception.core.names import topic_token
 from hooc_perception.core.types import GenericModel
 from hooc_perception.ros.conversions import header
 import numpy as np
-
-
-def topic_token(name):
-    """Return a name as a token that a topic or frame may hold: letters, digits, underscores."""
-    token = re.sub(r'[^A-Za-z0-9_]', '_', name)
-    return f'_{token}' if token[:1].isdigit() else token
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ import colorsys
 import json
 
 from geometry_msgs.msg import PoseArray
+from hooc_perception.core.names import topic_token
 from hooc_perception.ros.conversions import header, pose_array_message
-from hooc_perception.ros.found import topic_token
 from hooc_perception.ros.point_clouds import cloud_message, row_dtype
 from hooc_perception.ros.stage_messages import (
     labels_json,

@@ -11,6 +11,7 @@ without extrinsics is a scene of its own. The table frame is estimated (support_
 import re
 
 from hooc_perception.core.geometry import inverse, pose_from_matrix
+from hooc_perception.core.names import check_categories
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.scenes import camera_files, files, png
@@ -74,7 +75,8 @@ def _categories(models, info_file, info):
         entry = files.mapping(info.get(str(obj_id), {}), f'{info_file}: {obj_id}')
         name = files.name(entry.get('name', f'obj_{obj_id:06d}'), f'{info_file}: {obj_id} name')
         result[obj_id] = Category(name, models / f'obj_{obj_id:06d}.ply', MM)
-    files.unique([category.name for category in result.values()], f'{info_file}: name')
+    check_categories(files.unique([category.name for category in result.values()],
+                                  f'{info_file}: name'), info_file)
     return result
 
 

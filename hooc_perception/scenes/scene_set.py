@@ -5,6 +5,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from hooc_perception.core.names import check_categories
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.scenes import camera_files, files
@@ -140,7 +141,8 @@ def _categories(path, file, entry):
         if scale <= 0:
             raise HoocError(f'{where} scale is {scale:g}; give the metres of one model unit')
         result.append(Category(name, mesh, scale))
-    files.unique([category.name for category in result], f'{file}: categories')
+    check_categories(files.unique([category.name for category in result], f'{file}: categories'),
+                     file)
     return tuple(result)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hooc_perception.core.depth_encodings import counts_from_depth
+from hooc_perception.core.names import check_categories
 from hooc_perception.errors import HoocError
 from hooc_perception.scenes import camera_files, files, png
 import numpy as np
@@ -51,6 +52,7 @@ def write_scene_set(path, name, meshes, cameras, scenes, max_instances=0, depth_
         raise HoocError(f'{path}: the folder is in use; choose a new one or empty it')
     for category in meshes:
         files.name(category, f'{path}: the name of a category')
+    check_categories(meshes, path)
     (path / 'models').mkdir(parents=True, exist_ok=True)
     for category, mesh in meshes.items():
         mesh.export(path / 'models' / f'{category}.ply')

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The MODEL folder: what is saved comes back, and what was tampered with does not."""
 
+from dataclasses import replace
 import json
 import shutil
 
@@ -108,6 +109,15 @@ def test_names_must_be_fit_for_files(tmp_path, models, name):
     with pytest.raises(HoocError, match='name'):
         save_model_folder(tmp_path / 'm', 'x', models, {name: np.zeros(3)}, 'fast', 0, ())
     assert not (tmp_path / 'm').exists()
+
+
+def test_names_must_differ_as_topics(folder, models, tmp_path):
+    taken = [replace(models[0], name='can-1'), replace(models[2], name='can.1')]
+    with pytest.raises(HoocError, match="'can-1' and 'can.1' would share"):
+        save_model_folder(tmp_path / 'm', 'x', taken, CLASSIFIER, 'fast', 0, ())
+    assert not (tmp_path / 'm').exists()
+    _edit(folder, lambda meta: meta.update(categories=['can-1', 'ball', 'can_1']))
+    _refused(folder, "'can-1' and 'can_1' would share")
 
 
 def test_not_a_model_folder(tmp_path):

@@ -202,6 +202,8 @@ ERRORS = [
     ('models/models_info.json', lambda m: m.pop('3'), ('3',)),
     ('models/models_info.json', lambda m: m['3'].pop('size_x'), ('size_x',)),
     ('models/models_info.json', lambda m: m['3'].update(name='tall_box'), ('tall_box', 'twice')),
+    ('models/models_info.json', lambda m: m['3'].update(name='tall.box'),
+     ('tall_box', 'tall.box', 'rename')),
 ]
 
 

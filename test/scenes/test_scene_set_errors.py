@@ -54,6 +54,9 @@ DATASET = [
     (lambda d: d.update(cameras=['left', 'left']), ('cameras', 'left', 'twice')),
     (lambda d: d.update(cameras=['left', '../right']), ('cameras', '../right')),
     (lambda d: d.update(cameras=['left', '2nd']), ('cameras', '2nd')),
+    (lambda d: d['categories'].extend({'name': name, 'model': 'models/box.ply'}
+                                      for name in ('mug-1', 'mug.1')),
+     ('dataset.yaml', 'mug-1', 'mug.1', 'objects/mug_1/poses', 'rename')),
     (lambda d: d.update(depth_unit=0), ('depth_unit',)),
     (lambda d: d.update(depth_unit='mm'), ('depth_unit', 'mm')),
     (lambda d: d.update(depth_unit=float('inf')), ('depth_unit',)),
@@ -257,4 +260,6 @@ def test_written_sets_are_checked(path, tmp_path):
         write_scene_set(tmp_path / 'b', 'b', {}, (camera,), [NewScene('s', ())])
     with pytest.raises(HoocError, match='a/b'):
         write_scene_set(tmp_path / 'c', 'c', {'a/b': None}, (camera,), [])
+    with pytest.raises(HoocError, match="'1-a' and '_1_a' would share"):
+        write_scene_set(tmp_path / 'd', 'd', {'1-a': None, '_1_a': None}, (camera,), [])
     assert not (tmp_path / 'a' / 'dataset.yaml').exists()

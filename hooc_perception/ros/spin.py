@@ -12,8 +12,11 @@ import time
 from hooc_perception.errors import HoocError
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.signals import SignalHandlerOptions
 
 PARENT_VARIABLE = 'HOOC_SUPERVISOR_PID'
+HEED_S = 0.2    # Python heeds a signal when it is through with waiting
+_ENDS = signal.SIGINT, signal.SIGTERM
 _PR_SET_PDEATHSIG = 1
 
 
@@ -21,23 +24,33 @@ def run_node(make_node, args=None):
     """
     Spin the node that `make_node()` returns until a signal; return the exit code.
 
+    An active node is deactivated before it ends, while others still hear it.
+
     :param args: the ROS arguments, None = those of the process.
     """
     end_with_parent()
-    rclpy.init(args=args)
+    # rclpy's own handlers would end the context first, in which nobody can say good-bye.
+    for number in _ENDS:
+        signal.signal(number, signal.default_int_handler)
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        executor.spin()
+        while rclpy.ok():
+            executor.spin_once(timeout_sec=HEED_S)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except HoocError as error:
         print(f'[ERROR] {error}', file=sys.stderr, flush=True)
         return 1
     finally:
+        for number in _ENDS:
+            signal.signal(number, signal.SIG_IGN)   # it ends already
         if node is not None:
+            if rclpy.ok():
+                node.leave()
             node.destroy_node()
         rclpy.try_shutdown()
     return 0

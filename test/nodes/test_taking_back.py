@@ -3,6 +3,10 @@
 """Nothing that the parsing node has said outlives its watching, whatever ends that."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
 from types import SimpleNamespace
 
 from hooc_perception.models.derive import derive
@@ -40,6 +44,30 @@ KINDS = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
          'objects/labels': String, 'objects/markers': MarkerArray, 'scene/summary': String,
          'scene/unexplained': PointCloud2, 'objects/box/poses': PoseArray,
          'objects/can/poses': PoseArray}
+
+
+SPEAKER = """
+import sys
+from hooc_perception.ros.spin import run_node
+from hooc_perception.ros.stage_node import StageConfig, StageNode
+from std_msgs.msg import String
+
+class Speaker(StageNode):
+    def __init__(self):
+        super().__init__('speaker', StageConfig())
+        self.trigger_configure(), self.trigger_activate()
+
+    def configure(self):
+        self.words = self.publisher(String, 'scene/summary')
+
+    def activate(self):
+        self.words.publish(String(data='here'))
+
+    def deactivate(self):
+        self.words.publish(String(data='gone'))
+
+sys.exit(run_node(Speaker))
+"""
 
 
 class Adapter:
@@ -195,3 +223,21 @@ def test_a_broken_adapter_costs_neither_the_answer_nor_the_others(bench, parsing
     assert node.trigger_deactivate() == SUCCESS
     assert other.told == [2, 'clear'] and parsing.adapter.told[-1] == 'clear'
     assert bench.spin(lambda: is_taken_back(parsing.heard))
+
+
+@pytest.mark.parametrize('number', [signal.SIGINT, signal.SIGTERM])
+def test_an_interrupted_process_says_its_last_words(bench, number):
+    heard = bench.hear(String, 'scene/summary', qos('scene/summary'))
+    process = subprocess.Popen(
+        [sys.executable, '-c', SPEAKER],
+        env={**os.environ, 'ROS_DOMAIN_ID': str(bench.context.get_domain_id())},
+        # As a shell starts what it puts into the background.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN))
+    try:
+        assert bench.spin(lambda: heard, 60.0)
+        process.send_signal(number)
+        assert bench.spin(lambda: len(heard) == 2)
+        assert [message.data for message in heard] == ['here', 'gone']
+        assert process.wait(20) == 0
+    finally:
+        process.kill()

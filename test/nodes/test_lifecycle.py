@@ -20,11 +20,14 @@ from hooc_perception.nodes import (  # noqa: E402
     classification_node,
     ingestion_node,
     parsing_node,
+    replay_node,
 )
 from hooc_perception.nodes.warm_up import overhead_camera  # noqa: E402
 from hooc_perception.ros.misaddressed import misaddressed  # noqa: E402
 from hooc_perception.ros.stage_node import StageConfig, StageNode  # noqa: E402
 from hooc_perception.supervisor.params_file import unreached_sections  # noqa: E402
+from lifecycle_msgs.msg import Transition  # noqa: E402
+from lifecycle_msgs.srv import ChangeState, GetState  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
@@ -211,3 +214,45 @@ def test_models_that_cannot_be_read(bench, kind, tmp_path):
     assert node.trigger_configure() == FAILURE
     assert 'model.json' in bench.reasons(node)['node'][1]
     assert node.is_unconfigured()
+
+
+@pytest.mark.parametrize('module, kind', [
+    (ingestion_node, 'IngestionNode'), (classification_node, 'ClassificationNode'),
+    (candidate_node, 'CandidateNode'), (parsing_node, 'ParsingNode'),
+    (replay_node, 'ReplayNode')])
+def test_a_node_goes_its_whole_way_and_leaves_nothing_behind(bench, folder, repository, module,
+                                                             kind):
+    own = {'model': str(folder.path), 'warm_up': False}
+    if kind == 'ReplayNode':
+        own = {'bag': str(repository / 'bags' / 'demo')}
+        if not (repository / 'bags' / 'demo').is_dir():
+            pytest.skip('no bundled scene: make it with "make bundle"')
+    node = bench.add(getattr(module, kind), **own)
+    name = node.get_name()
+
+    def topics():
+        """Return what others see of the topics of the node."""
+        return {topic for topic, _ in bench.peer.get_publisher_names_and_types_by_node(
+            name, '/hooc')}
+
+    assert bench.spin(topics)
+    before = topics()
+    change = bench.peer.create_client(ChangeState, f'{name}/change_state')
+    state = bench.peer.create_client(GetState, f'{name}/get_state')
+    assert bench.spin(change.service_is_ready) and bench.spin(state.service_is_ready)
+    for step, reached in ((Transition.TRANSITION_CONFIGURE, 'inactive'),
+                          (Transition.TRANSITION_ACTIVATE, 'active'),
+                          (Transition.TRANSITION_DEACTIVATE, 'inactive'),
+                          (Transition.TRANSITION_CLEANUP, 'unconfigured'),
+                          (Transition.TRANSITION_CONFIGURE, 'inactive'),
+                          (Transition.TRANSITION_ACTIVATE, 'active'),
+                          (Transition.TRANSITION_ACTIVE_SHUTDOWN, 'finalized')):
+        done = change.call_async(ChangeState.Request(transition=Transition(id=step)))
+        assert bench.spin(done.done, 20.0) and done.result().success, bench.reasons(node)
+        said = state.call_async(GetState.Request())
+        assert bench.spin(said.done) and said.result().current_state.label == reached
+        assert node.active == (reached == 'active')
+        built = reached in ('inactive', 'active')
+        assert bench.spin(lambda built=built: (topics() > before) if built
+                          else topics() == before), (reached, topics() ^ before)
+    assert bench.reasons(node)['node'][0] == 'ok'

@@ -172,6 +172,22 @@ def test_deactivating_empties_what_is_latched(bench, parsing):
     assert is_taken_back(parsing.heard)
 
 
+def test_a_second_life_begins_with_nothing_and_ends_so(bench, parsing):
+    node = parsing.node
+    for step in ('deactivate', 'cleanup', 'configure', 'activate'):
+        assert getattr(node, f'trigger_{step}')() == SUCCESS
+    late = listen(bench)
+    assert bench.spin(lambda: late['objects/labels'])
+    assert [topic for topic, messages in late.items() if messages] == ['objects/labels']
+    parsing.look()
+    assert bench.spin(lambda: all(late.values()))
+    assert node.trigger_shutdown() == SUCCESS
+    assert bench.spin(lambda: is_taken_back(late))
+    last = listen(bench)
+    bench.rest(0.3)
+    assert not any(last.values())
+
+
 @pytest.mark.parametrize('end', ['trigger_shutdown', 'on_error'])
 def test_the_end_takes_back_what_other_packages_hold(bench, parsing, end):
     act = getattr(parsing.node, end)

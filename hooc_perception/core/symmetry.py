@@ -193,7 +193,8 @@ def _turns(M, scale, orders):
         if _alike(scale):
             yield M.T
             return
-        orders, continuous = (2, 2, 2), []      # an ellipsoid
+        # An ellipsoid: quarter turns exchange its sides.
+        orders, continuous = (4, 4, 4), []
     if not continuous:
         yield from (S for S in _rotations(orders) if _fits(S, scale))
         return

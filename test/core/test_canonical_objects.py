@@ -80,6 +80,13 @@ def test_a_stretched_ball_keeps_its_shape(scale):
         np.testing.assert_allclose(after, before, atol=1e-9)
 
 
+def test_a_stretched_ball_does_not_flip_where_its_sides_change_places():
+    quarter = Rotation.from_euler('xyz', [0.1, -0.1, np.pi / 2 + 0.1]).as_matrix()
+    turned, scale = nearest_equivalent(quarter, (1.3, 0.8, 1.1), (0, 0, 0))
+    assert Rotation.from_matrix(turned).magnitude() < 0.3
+    np.testing.assert_allclose(scale, (0.8, 1.3, 1.1))
+
+
 def test_a_ball_is_never_turned():
     for R in turns(10, 7):
         turned, scale = nearest_equivalent(R, (1.03, 1, 0.98), (0, 0, 0))

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """tf2, vision_msgs and MoveIt get what their definitions say, on machines without them, too."""
 
+from dataclasses import replace
 import importlib.util
 from pathlib import Path
 import sys
@@ -219,6 +220,21 @@ def test_at_once_on_clear_and_when_time_was_set_back(stubs, scene):
     assert told(stubs, node)[2] == [('can_9', 1), ('tea_box_7', 0)]
     adapter.clear(node.now, 'table')
     assert told(stubs, node)[3] == [('tea_box_7', 1)]
+
+
+def test_a_bag_that_starts_again_leaves_no_ghosts(stubs, scene):
+    """The stamps are set back, the clock of the node is not."""
+    stubs.install('moveit_msgs')
+    node = Node(planning_scene='box')
+    adapter, = adapters_of(node)
+    adapter.publish(scene)
+    again = replace(scene, stamp_ns=STAMP - 10 ** 9, objects=tuple(
+        replace(o, id=o.id + 10) for o in scene.objects))
+    adapter.publish(again)
+    assert told(stubs, node)[1] == [('can_9', 1), ('tea_box_7', 1), ('tea_box_17', 0),
+                                    ('can_19', 0)]
+    adapter.clear(node.now, 'table')
+    assert told(stubs, node)[2] == [('tea_box_17', 1), ('can_19', 1)]
 
 
 def test_real_packages_have_the_fields_of_the_stubs(stubs):

@@ -27,17 +27,21 @@ class PlanningSceneDiffs:
         self._messages = messages_of('moveit_msgs', 'planning_scene')
         self._publisher = node.publisher(self._messages.PlanningScene, '/planning_scene')
         self._seen = {}     # name -> node time (ns) of the last answer that shows it
-        self._frame = node.config.target_frame
+        self._frame, self._stamp_ns = node.config.target_frame, 0   # of the last answer
         node.owned(node.destroy_timer, node.create_timer(CHECK_S, node.guarded(
             self.expire, type(self).__name__, 'what is gone stays in the planning scene')))
 
     def publish(self, scene):
         """Add or replace the objects of a FoundScene and remove those whose time is over."""
         now, self._frame = self._node.now_ns(), scene.frame
-        self._seen.update({o.name: now for o in scene.objects})
+        shown = {o.name: now for o in scene.objects}
+        # Time was set back (a looped bag): ids begin anew, and those of before never come again.
+        gone = [] if scene.stamp_ns >= self._stamp_ns else sorted(set(self._seen) - set(shown))
+        self._seen = {name: t for name, t in self._seen.items() if name not in gone} | shown
+        self._stamp_ns = scene.stamp_ns
         added = [collision_object(o, scene.header, self._shape, self._messages)
                  for o in scene.objects]
-        self._send(added, self._expired(now), scene.header)
+        self._send(added, gone + self._expired(now), scene.header)
 
     def expire(self):
         """Remove what no answer has shown for too long."""

@@ -73,7 +73,7 @@ class ParsingNode(StageNode):
             'probabilities': (PointCloud2, 'pixels/probabilities'),
             'poses': (PoseArray, 'candidates/poses'),
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set)
-        self.more = MoreCandidates(self)
+        self.more = MoreCandidates(self, len(model.models))
         self.detect = DetectService(self, lambda: None if self.enabled else (
             'frame sets are ignored: call enable with true'))
         self.adapters = adapters_of(self)

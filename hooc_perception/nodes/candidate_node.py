@@ -41,7 +41,7 @@ class CandidateNode(StageNode):
         self.more_poses = self.publisher(PoseArray, 'candidates/more/poses')
         self.more_attributes = self.publisher(PointCloud2, 'candidates/more/attributes')
         self.subscription(String, 'candidates/requests', self.on_request)
-        self.input = ViewInput(self, camera_names(self.config, model),
+        self.input = ViewInput(self, camera_names(self.config, model), 'propose',
                                {'probabilities': (PointCloud2, 'pixels/probabilities')},
                                self.on_set)
 
@@ -55,15 +55,10 @@ class CandidateNode(StageNode):
     def on_set(self, stamp_ns, observation, messages):
         """Propose candidates for one frame set."""
         start = time.monotonic()
-        try:
-            probabilities = probabilities_from_message(messages['probabilities'], observation,
-                                                       len(self.models))
-            candidates = propose(observation, probabilities, self.models,
-                                 self.parameters['propose'],
-                                 stage_rng(self.config.seed, 'propose'))
-        except HoocError as error:
-            self.diagnostics.error('propose', 'refused', str(error))
-            return
+        probabilities = probabilities_from_message(messages['probabilities'], observation,
+                                                   len(self.models))
+        candidates = propose(observation, probabilities, self.models, self.parameters['propose'],
+                             stage_rng(self.config.seed, 'propose'))
         self.proposers.keep(stamp_ns, proposer(observation, probabilities, self.models,
                                                self.parameters['propose'], self.config.seed))
         poses, attributes = candidates_messages(candidates,

@@ -43,7 +43,7 @@ class ClassificationNode(StageNode):
         self.probabilities = self.publisher(PointCloud2, 'pixels/probabilities')
         self.labels = [self.publisher(Image, 'pixels/<camera>/labels', f'pixels/{name}/labels')
                        for name in self.names]
-        self.input = ViewInput(self, self.names, {}, self.on_views)
+        self.input = ViewInput(self, self.names, 'classify', {}, self.on_views)
 
     def on_views(self, stamp_ns, observation, messages):
         """Classify one frame set."""
@@ -53,13 +53,9 @@ class ClassificationNode(StageNode):
                                                self.trained)
         if trouble:
             self.diagnostics.warn('model', 'other_rig', trouble)
-        try:
-            probabilities = classify(observation, self.classifier, self.parameters['classify'])
-            self.probabilities.publish(
-                probabilities_message(probabilities, observation, self.classes, head))
-        except HoocError as error:
-            self.diagnostics.error('classify', 'refused', str(error))
-            return
+        probabilities = classify(observation, self.classifier, self.parameters['classify'])
+        self.probabilities.publish(
+            probabilities_message(probabilities, observation, self.classes, head))
         seconds = time.monotonic() - start
         images = label_images(probabilities, observation)
         for name, publisher, image in zip(self.names, self.labels, images):

@@ -3,7 +3,7 @@
 """What the lifecycle nodes share: parameters, transitions that explain failures, endpoints."""
 
 import ctypes
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import functools
 import gc
 import json
@@ -14,20 +14,14 @@ import traceback
 
 from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
-from hooc_perception.ros.diagnostics import Diagnostics
+from hooc_perception.ros.diagnostics import Diagnostics, WARN
 from hooc_perception.ros.misaddressed import misaddressed
-from hooc_perception.ros.parameters import Parameters
+from hooc_perception.ros.parameters import fixed_param, Parameters
 from hooc_perception.ros.qos import overridable, qos
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
 PROFILES = ('paper', 'best', 'fast')
-
-
-def fixed_param(*args, **kwargs):
-    """Declare a parameter that never changes after the node has started; as `param`."""
-    declared = param(*args, **kwargs)
-    return field(default=declared.default, metadata={**declared.metadata, 'read_only': True})
 
 
 @dataclass(frozen=True)
@@ -171,6 +165,7 @@ class StageNode(LifecycleNode):
             LifecycleNode.on_configure(self, state)
         if self._attempt('configure', build):
             self._report_misaddressed()
+            self._say_inactive('configured')
             return TransitionCallbackReturn.SUCCESS
         self._destroy()
         return TransitionCallbackReturn.FAILURE
@@ -182,18 +177,21 @@ class StageNode(LifecycleNode):
             LifecycleNode.on_activate(self, state)
             self.activate()
             self.active = True
+            self.diagnostics.state('node', 'ok', 'ok')
         done = self._attempt('activate', start)
         return TransitionCallbackReturn.SUCCESS if done else TransitionCallbackReturn.FAILURE
 
     def on_deactivate(self, state):
         """Silence the node; what was built stays."""
         self.active = False
-        self._attempt('deactivate', self.deactivate)
+        if self._attempt('deactivate', self.deactivate):
+            self._say_inactive('deactivated')
         return LifecycleNode.on_deactivate(self, state)
 
     def on_cleanup(self, state):
         """Forget what was built."""
         self._destroy()
+        self._say_inactive('cleaned up', 'configure and activate it')
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state):
@@ -208,11 +206,13 @@ class StageNode(LifecycleNode):
         self._destroy()
         return TransitionCallbackReturn.SUCCESS
 
+    def _say_inactive(self, what, mend='activate it'):
+        self.diagnostics.state('node', 'not_active', f'{what}, so nothing is done: {mend}', WARN)
+
     def _attempt(self, what, step):
         """Return whether `step()` went through; log the sentence or the surprise otherwise."""
         try:
             step()
-            self.diagnostics.succeeded()
             return True
         except HoocError as error:
             self.diagnostics.failed(f'{what}_failed', str(error))

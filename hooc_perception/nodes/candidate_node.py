@@ -32,7 +32,7 @@ class CandidateNode(StageNode):
 
     def configure(self):
         """Load the generic models, build the endpoints."""
-        model = model_of(self.config)
+        model = model_of(self)
         self.models = model.models
         warmed(self, model, self.try_out)
         self.proposers = Proposers()
@@ -41,7 +41,7 @@ class CandidateNode(StageNode):
         self.more_poses = self.publisher(PoseArray, 'candidates/more/poses')
         self.more_attributes = self.publisher(PointCloud2, 'candidates/more/attributes')
         self.subscription(String, 'candidates/requests', self.on_request)
-        self.input = ViewInput(self, camera_names(self.config, model), 'propose',
+        self.input = ViewInput(self, camera_names(self, model), 'propose',
                                {'probabilities': (PointCloud2, 'pixels/probabilities')},
                                self.on_set)
 

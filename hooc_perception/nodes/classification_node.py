@@ -29,8 +29,8 @@ class ClassificationNode(StageNode):
 
     def configure(self):
         """Load the classifier, build the endpoints."""
-        model = model_of(self.config)
-        self.names = camera_names(self.config, model)
+        model = model_of(self)
+        self.names = camera_names(self, model)
         self.classes, self.classifier = [m.name for m in model.models], model.classifier
         # The paper's forests look into all views at once, from where they were trained.
         self.trained = model.cameras if np.array_equal(
@@ -53,6 +53,8 @@ class ClassificationNode(StageNode):
                                                self.trained)
         if trouble:
             self.diagnostics.warn('model', 'other_rig', trouble)
+        else:
+            self.diagnostics.ok('model')
         probabilities = classify(observation, self.classifier, self.parameters['classify'])
         self.probabilities.publish(
             probabilities_message(probabilities, observation, self.classes, head))

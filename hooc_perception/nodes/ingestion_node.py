@@ -57,7 +57,7 @@ class IngestionNode(StageNode):
 
     def configure(self):
         """Build the assembly and the endpoints of every camera."""
-        self.names = camera_names(self.config)
+        self.names = camera_names(self)
         if self.config.min_cameras > len(self.names):
             raise HoocError(self.too_few())
         if self.config.warm_up:

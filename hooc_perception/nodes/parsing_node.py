@@ -59,7 +59,7 @@ class ParsingNode(StageNode):
 
     def configure(self):
         """Load the generic models, build the endpoints."""
-        model = model_of(self.config)
+        model = model_of(self)
         self.models, self.enabled = model.models, True
         self.verifier = Verifier.from_arrays(model.classifier)
         limit = self.config.max_instances
@@ -69,7 +69,7 @@ class ParsingNode(StageNode):
         self.output = ObjectOutput(self, model.models, [
             (model.mesh_path(m.name).resolve().as_uri(), model.mesh_sha256[m.name])
             for m in model.models])
-        self.input = ViewInput(self, camera_names(self.config, model), 'parse', {
+        self.input = ViewInput(self, camera_names(self, model), 'parse', {
             'probabilities': (PointCloud2, 'pixels/probabilities'),
             'poses': (PoseArray, 'candidates/poses'),
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set,

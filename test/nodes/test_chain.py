@@ -288,6 +288,18 @@ def test_an_answer_that_nothing_follows_is_taken_back(chain):
     assert len(heard['objects/poses']) == n, 'it is taken back once'
 
 
+def test_the_model_and_the_stage_have_a_status_before_the_first_frame(chain):
+    stages, bench, send = chain
+    for node, stage in zip(bench.chain[1:], ('classify', 'propose', 'parse')):
+        status = {s.name.partition(': ')[2]: s for s in node.diagnostics.statuses()}
+        assert bench.reasons(node)[stage][0] == 'waiting' and status[stage].level == b'\0'
+        values = {v.key: v.value for v in status['model'].values}
+        assert values == {'reason': 'ok', 'name': 'm', 'profile': 'fast',
+                          'categories': 'box, ball, can'}
+    send()
+    assert bench.spin(lambda: bench.reasons(bench.chain[3])['parse'][0] == 'ok')
+
+
 def test_profile_and_overrides_give_the_stage_parameters(bench, folder):
     from hooc_perception.core.profiles import profile
     for name in ('paper', 'best', 'fast'):

@@ -8,7 +8,9 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.nodes.replay_node import ReplayNode  # noqa: E402
 from hooc_perception.ros import view_topics  # noqa: E402
+from hooc_perception.ros.conversions import header  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
 from std_msgs.msg import Header  # noqa: E402
 
@@ -74,3 +76,22 @@ def test_views_of_another_frame_are_refused(bench, make_chain):
     code, sentence = bench.reasons(bench.chain[3])['views']
     assert code == 'refused' and "'table'" in sentence and "'robot_base'" in sentence
     assert 'target_frame' in sentence and not answers
+
+
+def test_a_replay_that_waits_goes_on(bench, repository):
+    bag = repository / 'bags' / 'demo'
+    if not bag.is_dir():
+        pytest.skip('no bundled scene: make it with "make bundle"')
+    node = bench.add(ReplayNode, bag=str(bag), rate=0.0, loop=True,
+                     answer_timeout_s=3600.0, wait_for_subscribers=0)
+    refusals = bench.peer.create_publisher(Header, 'views/refused', qos('views/refused'))
+    node.trigger_configure()
+    node.trigger_activate()
+    assert bench.spin(lambda: refusals.get_subscription_count() and node.player
+                      and node.player.waits_for_release)
+    refused = node.player.set_stamp_ns
+    refusals.publish(header(refused - 1, 'table'))      # of an older set
+    bench.rest(0.3)
+    assert node.player.waits_for_release
+    refusals.publish(header(refused, 'table'))
+    assert bench.spin(lambda: node.player.set_stamp_ns > refused)

@@ -188,8 +188,8 @@ def make_chain(bench, folder, monkeypatch):
                                   f'/hooc/views/{name}/depth_rect') == 3)
         bench.rest(0.3)
 
-        def send(shift_s=0.0, only=names):
-            stamp = peer.get_clock().now().nanoseconds + int(shift_s * 1e9)
+        def send(shift_s=0.0, only=names, stamp=None):
+            stamp = stamp or peer.get_clock().now().nanoseconds + int(shift_s * 1e9)
             for name in only:
                 head = c.header(stamp, f'{name}_optical')
                 topics[name][0].publish(c.camera_info_message(cameras[name], head))

@@ -14,7 +14,7 @@ from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.conversions import header
-from hooc_perception.ros.reproposal import parsed_request
+from hooc_perception.ros.reproposal import no_answer_messages, parsed_request, Proposers
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_messages import candidates_messages, probabilities_from_message
 from hooc_perception.ros.stage_node import StageConfig, StageNode
@@ -32,16 +32,16 @@ class CandidateNode(StageNode):
 
     def configure(self):
         """Load the generic models, build the endpoints."""
-        model = model_of(self.config)
+        model = model_of(self)
         self.models = model.models
         warmed(self, model, self.try_out)
-        self.latest = None          # (stamp, what proposes anew for it)
+        self.proposers = Proposers()
         self.poses = self.publisher(PoseArray, 'candidates/poses')
         self.attributes = self.publisher(PointCloud2, 'candidates/attributes')
         self.more_poses = self.publisher(PoseArray, 'candidates/more/poses')
         self.more_attributes = self.publisher(PointCloud2, 'candidates/more/attributes')
         self.subscription(String, 'candidates/requests', self.on_request)
-        self.input = ViewInput(self, camera_names(self.config, model),
+        self.input = ViewInput(self, camera_names(self, model), 'propose',
                                {'probabilities': (PointCloud2, 'pixels/probabilities')},
                                self.on_set)
 
@@ -55,17 +55,12 @@ class CandidateNode(StageNode):
     def on_set(self, stamp_ns, observation, messages):
         """Propose candidates for one frame set."""
         start = time.monotonic()
-        try:
-            probabilities = probabilities_from_message(messages['probabilities'], observation,
-                                                       len(self.models))
-            candidates = propose(observation, probabilities, self.models,
-                                 self.parameters['propose'],
-                                 stage_rng(self.config.seed, 'propose'))
-        except HoocError as error:
-            self.diagnostics.error('propose', 'refused', str(error))
-            return
-        self.latest = stamp_ns, proposer(observation, probabilities, self.models,
-                                         self.parameters['propose'], self.config.seed)
+        probabilities = probabilities_from_message(messages['probabilities'], observation,
+                                                   len(self.models))
+        candidates = propose(observation, probabilities, self.models, self.parameters['propose'],
+                             stage_rng(self.config.seed, 'propose'))
+        self.proposers.keep(stamp_ns, proposer(observation, probabilities, self.models,
+                                               self.parameters['propose'], self.config.seed))
         poses, attributes = candidates_messages(candidates,
                                                 header(stamp_ns, self.config.target_frame))
         self.attributes.publish(attributes)
@@ -74,20 +69,25 @@ class CandidateNode(StageNode):
                             candidates=len(candidates))
 
     def on_request(self, message):
-        """Propose anew for what the objects chosen so far leave unexplained."""
+        """Propose anew for what the objects chosen so far leave unexplained; always answer."""
+        if not self.active:
+            return
         try:
             stamp_ns, turn, objects = parsed_request(message.data)
-            if not self.active or self.latest is None or self.latest[0] != stamp_ns:
-                return
-            more = self.latest[1](objects, turn)
         except HoocError as error:
             self.diagnostics.error('propose', 'refused', str(error))
             return
-        poses, attributes = candidates_messages(
-            more, header(stamp_ns, self.config.target_frame), turn)
-        self.more_attributes.publish(attributes)
-        self.more_poses.publish(poses)
-        self.diagnostics.ok('propose', candidates_round=len(more))
+        head = header(stamp_ns, self.config.target_frame)
+        poses, attributes = no_answer_messages(head, turn)
+        try:
+            more = self.proposers.of(stamp_ns)(objects, turn)
+            poses, attributes = candidates_messages(more, head, turn)
+            self.diagnostics.ok('propose', candidates_round=len(more))
+        except HoocError as error:
+            self.diagnostics.warn('propose', 'no_more_candidates', str(error))
+        finally:
+            self.more_attributes.publish(attributes)
+            self.more_poses.publish(poses)
 
 
 def main(args=None):

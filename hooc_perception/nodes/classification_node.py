@@ -29,8 +29,8 @@ class ClassificationNode(StageNode):
 
     def configure(self):
         """Load the classifier, build the endpoints."""
-        model = model_of(self.config)
-        self.names = camera_names(self.config, model)
+        model = model_of(self)
+        self.names = camera_names(self, model)
         self.classes, self.classifier = [m.name for m in model.models], model.classifier
         # The paper's forests look into all views at once, from where they were trained.
         self.trained = model.cameras if np.array_equal(
@@ -43,7 +43,7 @@ class ClassificationNode(StageNode):
         self.probabilities = self.publisher(PointCloud2, 'pixels/probabilities')
         self.labels = [self.publisher(Image, 'pixels/<camera>/labels', f'pixels/{name}/labels')
                        for name in self.names]
-        self.input = ViewInput(self, self.names, {}, self.on_views)
+        self.input = ViewInput(self, self.names, 'classify', {}, self.on_views)
 
     def on_views(self, stamp_ns, observation, messages):
         """Classify one frame set."""
@@ -53,13 +53,11 @@ class ClassificationNode(StageNode):
                                                self.trained)
         if trouble:
             self.diagnostics.warn('model', 'other_rig', trouble)
-        try:
-            probabilities = classify(observation, self.classifier, self.parameters['classify'])
-            self.probabilities.publish(
-                probabilities_message(probabilities, observation, self.classes, head))
-        except HoocError as error:
-            self.diagnostics.error('classify', 'refused', str(error))
-            return
+        else:
+            self.diagnostics.ok('model')
+        probabilities = classify(observation, self.classifier, self.parameters['classify'])
+        self.probabilities.publish(
+            probabilities_message(probabilities, observation, self.classes, head))
         seconds = time.monotonic() - start
         images = label_images(probabilities, observation)
         for name, publisher, image in zip(self.names, self.labels, images):

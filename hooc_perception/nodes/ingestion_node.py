@@ -8,7 +8,6 @@ import time
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.config import param
-from hooc_perception.core.kernels.undistort import rectify_nearest
 from hooc_perception.core.observe import rectify
 from hooc_perception.core.plausible import table_trouble
 from hooc_perception.core.types import DepthView, RectifiedView
@@ -18,11 +17,12 @@ from hooc_perception.nodes.warm_up import overhead_camera
 from hooc_perception.ros.camera_input import CameraInput, declared_pose, TfPoses
 from hooc_perception.ros.conversions import nanoseconds
 from hooc_perception.ros.frame_sets import EXPLAINED, FrameSetConfig, FrameSets, SILENT
-from hooc_perception.ros.raw_frames import FrameRefused, RawFrames
+from hooc_perception.ros.raw_frames import FrameRefused, RawFrames, rectified_count
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_node import StageConfig, StageNode
 from hooc_perception.ros.view_topics import ViewOutput
 import numpy as np
+from std_msgs.msg import Header
 
 # The table does not come and go: it is looked for at most so often.
 LOOK_FOR_TABLE_S = 5.0
@@ -57,7 +57,9 @@ class IngestionNode(StageNode):
 
     def configure(self):
         """Build the assembly and the endpoints of every camera."""
-        self.names = camera_names(self.config)
+        self.names = camera_names(self)
+        if self.config.min_cameras > len(self.names):
+            raise HoocError(self.too_few())
         if self.config.warm_up:
             rectify(DepthView(overhead_camera(), np.ones((120, 160), np.float32)))
         self.sets = FrameSets(self.names, self.config)
@@ -67,6 +69,7 @@ class IngestionNode(StageNode):
         self.table_seen = -LOOK_FOR_TABLE_S
         self.output = ViewOutput(self, self.names)
         self.subscription(PoseArray, 'objects/poses', self.on_answer)
+        self.subscription(Header, 'views/refused', self.on_refused)
         tf = TfPoses(self)
         self.inputs = [CameraInput(self, name, declared_pose(self, name), tf, self.on_frame)
                        for name in self.names]
@@ -109,6 +112,13 @@ class IngestionNode(StageNode):
         if self.sent and nanoseconds(message.header.stamp) >= self.sent[0]:
             self.sent = None
             self.diagnostics.ok('chain')
+            self.send_if_complete()
+
+    def on_refused(self, message):
+        """Note that the last set will not be answered; the stage that refused it says why."""
+        if self.sent and nanoseconds(message.stamp) == self.sent[0]:
+            self.sent = None
+            self.diagnostics.count('chain', 'refused')
             self.send_if_complete()
 
     def on_timer(self):
@@ -169,21 +179,27 @@ class IngestionNode(StageNode):
         return views, counts
 
     def tell_of_lost(self):
-        """Say which cameras the sets go without."""
+        """Say which cameras the sets go without, and where too few are left for any set."""
         lost = self.sets.lost
-        if not lost:
-            return
+        left = len(self.names) - len(lost)
         why = {True: 'nothing usable comes from it', False: 'its stamps are too far from those '
                'of the other cameras (max_set_spread_s); synchronise the clocks'}
         sentence = '; '.join(f'{name} is left out: {why[reason == SILENT]}'
                              for name, reason in sorted(lost.items()))
-        left = len(self.names) - len(lost)
-        if left < self.config.min_cameras:
+        if self.config.min_cameras > len(self.names):
+            self.diagnostics.error('views', 'too_few_cameras', self.too_few())
+        elif left < self.config.min_cameras:
             self.diagnostics.error('views', 'too_few_cameras', f'{sentence}; {left} of '
                                    f'{len(self.names)} cameras are too few (min_cameras)')
-        else:
+        elif lost:
             self.diagnostics.warn('views', 'fewer_cameras', f'{sentence}; going on with {left} '
                                   f'of {len(self.names)} until it returns')
+
+    def too_few(self):
+        """Return why no set can ever go out."""
+        return (f'min_cameras is {self.config.min_cameras}, but the parameter cameras names only '
+                f'{len(self.names)} ({", ".join(self.names)}), so no frame set would ever go out; '
+                'lower min_cameras')
 
     def look_for_table(self, views, frame_set):
         """Say now and then which cameras do not see the table where it should be."""
@@ -207,7 +223,8 @@ class IngestionNode(StageNode):
         if time.monotonic() - self.sent[1] < wait:
             return True
         self.diagnostics.warn('chain', 'no_answer', f'no objects came for a frame set within '
-                              f'{wait:g} s; going on with the next')
+                              f'{wait:g} s; is a later node at work for longer, or '
+                              'not active, or parsing disabled? going on with the next')
         self.sent = None
         return False
 
@@ -217,14 +234,6 @@ def blind_view(name, camera):
     camera = camera or replace(overhead_camera(), name=name)
     nothing = np.full((camera.height, camera.width), np.nan, np.float32)
     return RectifiedView(replace(camera, D=np.zeros(len(camera.D))), nothing)
-
-
-def rectified_count(count, camera):
-    """Return (H, W) uint8 counts of readings where `rectify` puts the readings."""
-    d = np.zeros(8)
-    d[:len(camera.D)] = camera.D[:8]
-    moved = rectify_nearest(count.astype(np.float32), np.ascontiguousarray(camera.K), d)
-    return np.nan_to_num(moved).astype(np.uint8)
 
 
 def main(args=None):

@@ -6,17 +6,24 @@ from hooc_perception.errors import HoocError
 from hooc_perception.models.folder import load_model_folder
 
 
-def model_of(config):
-    """Return the ModelFolder that a StageConfig names; HoocError where it cannot be read."""
-    if not config.model:
+def model_of(node):
+    """
+    Return the ModelFolder that a StageNode's parameters name; /diagnostics say which it is.
+
+    :raises HoocError: where it cannot be read.
+    """
+    if not node.config.model:
         raise HoocError('parameter model is empty; set it to the folder that hooc train wrote')
-    return load_model_folder(config.model)
+    model = load_model_folder(node.config.model)
+    node.diagnostics.ok('model', name=model.name, profile=node.config.profile or model.profile,
+                        categories=', '.join(m.name for m in model.models))
+    return model
 
 
-def camera_names(config, model=None):
-    """Return the names of the cameras that a StageConfig or its model (if loaded) names."""
-    names = config.cameras or tuple(
-        camera.name for camera in (model or model_of(config)).cameras)
+def camera_names(node, model=None):
+    """Return the names of the cameras that a StageNode or its model (if loaded) names."""
+    names = node.config.cameras or tuple(
+        camera.name for camera in (model or model_of(node)).cameras)
     if not names:
         raise HoocError('parameter cameras is empty and the model names none; set cameras')
     if len(set(names)) != len(names):

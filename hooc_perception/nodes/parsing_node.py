@@ -16,11 +16,11 @@ from hooc_perception.core.parse import parse
 from hooc_perception.core.tracking import TrackConfig, Tracker
 from hooc_perception.core.unexplained import unexplained_points
 from hooc_perception.core.verify import Verifier
-from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.adapters.choose import AdapterConfig, adapters_of, tell
 from hooc_perception.ros.detect_service import DetectService
+from hooc_perception.ros.diagnostics import WARN
 from hooc_perception.ros.found import found_scene
 from hooc_perception.ros.object_output import ObjectOutput
 from hooc_perception.ros.reproposal import MoreCandidates
@@ -61,7 +61,7 @@ class ParsingNode(StageNode):
 
     def configure(self):
         """Load the generic models, build the endpoints."""
-        model = model_of(self.config)
+        model = model_of(self)
         self.models, self.enabled = model.models, True
         self.verifier = Verifier.from_arrays(model.classifier)
         limit = self.config.max_instances
@@ -71,11 +71,12 @@ class ParsingNode(StageNode):
         self.output = ObjectOutput(self, model.models, [
             (model.mesh_path(m.name).resolve().as_uri(), model.mesh_sha256[m.name])
             for m in model.models])
-        self.input = ViewInput(self, camera_names(self.config, model), {
+        self.input = ViewInput(self, camera_names(self, model), 'parse', {
             'probabilities': (PointCloud2, 'pixels/probabilities'),
             'poses': (PoseArray, 'candidates/poses'),
-            'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set)
-        self.more = MoreCandidates(self)
+            'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set,
+            lambda: self.enabled)
+        self.more = MoreCandidates(self, len(model.models))
         self.adapters = adapters_of(self)
         self.answered = None        # monotonic s of the answer that stands, None: there is none
         self.steady_timer(0.5, self.on_timer)
@@ -105,21 +106,15 @@ class ParsingNode(StageNode):
 
     def on_set(self, stamp_ns, observation, messages):
         """Parse one frame set."""
-        if not self.enabled:
-            return
         start = time.monotonic()
-        try:
-            n = len(self.models)
-            probabilities = probabilities_from_message(messages['probabilities'], observation, n)
-            parsed = parse(
-                observation, probabilities,
-                candidates_from_messages(messages['poses'], messages['attributes'], n),
-                self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
-                self.max_instances, self.more.asker(stamp_ns, self.config.more_timeout_s),
-                self.verifier)
-        except HoocError as error:
-            self.diagnostics.error('parse', 'refused', str(error))
-            return
+        n = len(self.models)
+        probabilities = probabilities_from_message(messages['probabilities'], observation, n)
+        parsed = parse(
+            observation, probabilities,
+            candidates_from_messages(messages['poses'], messages['attributes'], n),
+            self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
+            self.max_instances, self.more.asker(stamp_ns, self.config.more_timeout_s),
+            self.verifier)
         if self.config.sigmas:
             parsed = with_sigmas(
                 parsed, observation, probabilities, self.models, self.parameters['parse'],
@@ -141,8 +136,12 @@ class ParsingNode(StageNode):
 
     def on_enable(self, request, response):
         """Let frame sets be parsed, or ignore them."""
-        self.enabled = request.data
-        if not self.enabled:
+        before, self.enabled = self.enabled, request.data
+        if self.enabled and not before:
+            self.input.wait()
+            self.input.resume()
+        elif not self.enabled:
+            self.say_disabled()
             self.detect.fail('frame sets are ignored from now on')
         response.success = True
         response.message = 'parsing' if self.enabled else 'frame sets are ignored'
@@ -155,6 +154,13 @@ class ParsingNode(StageNode):
             self.diagnostics.warn('parse', 'answer_expired', 'no frame set has come for '
                                   f'{keep:g} s (keep_answer_s); the last answer is taken back')
             self.take_back()
+            if not self.enabled:
+                self.say_disabled()
+
+    def say_disabled(self):
+        """Say in /diagnostics why there are no answers."""
+        self.diagnostics.state('parse', 'disabled', 'frame sets are ignored: call enable with '
+                               'true', WARN)
 
     def on_reset(self, request, response):
         """Forget what waits to be joined and what was seen; take the last answer back."""

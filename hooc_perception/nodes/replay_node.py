@@ -24,7 +24,7 @@ from hooc_perception.ros.stage_node import StageNode
 from rclpy.duration import Duration
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CameraInfo, Image
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,9 @@ class ReplayNode(StageNode):
             self.publisher(Image, '<camera>/depth/image_raw', f'{name}/depth/image_raw'))
             for name in self.cameras}
         self.status = self.publisher(String, 'replay/status')
-        self.subscription(PoseArray, 'objects/poses', self.on_answer)
+        self.subscription(PoseArray, 'objects/poses',
+                          lambda message: self.go_on(message.header.stamp))
+        self.subscription(Header, 'views/refused', lambda message: self.go_on(message.stamp))
 
     def activate(self):
         """Start to wait for subscribers."""
@@ -107,10 +109,10 @@ class ReplayNode(StageNode):
         if self.player.finished:
             self.say('finished')
 
-    def on_answer(self, message):
-        """At rate 0: the chain is free for the next frame set."""
+    def go_on(self, stamp):
+        """At rate 0: a set was answered or refused, so the chain is free for the next."""
         if self.active and self.player and self.player.waits_for_release and (
-                nanoseconds(message.header.stamp) >= self.player.set_stamp_ns):
+                nanoseconds(stamp) >= self.player.set_stamp_ns):
             self.player.released()
 
     def wait_for_subscribers(self):

@@ -47,9 +47,9 @@ class Diagnostics:
                 self._logged = {key: v for key, v in self._logged.items() if key[0] != thing}
         self._values.setdefault(thing, {}).update(values)
 
-    def succeeded(self):
-        """Report that the node itself did what it was asked to."""
-        self._state['node'] = (OK, 'ok', 'ok', time.monotonic())
+    def state(self, thing, code, sentence, level=OK):
+        """Report what is so, on purpose, until something else is: neither logged nor counted."""
+        self._state[thing] = (level, code, sentence, time.monotonic() - HOLD_S)
 
     def count(self, thing, code, number=1):
         """Count what is normal but worth knowing (frames superseded)."""

@@ -7,9 +7,10 @@ A field `f` of section `parse` becomes the parameter `parse.f`; a node's own fie
 prefix. Values that a Config refuses are refused with its sentence as the reason.
 """
 
-from dataclasses import fields, replace
+from dataclasses import field, fields, replace
 import sys
 
+from hooc_perception.core.config import param
 from hooc_perception.errors import HoocError
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -20,6 +21,12 @@ from rcl_interfaces.msg import (
 from rclpy.parameter import Parameter
 
 _INT64 = 2 ** 63 - 1
+
+
+def fixed_param(*args, **kwargs):
+    """Declare a parameter that never changes after the node has started; as `param`."""
+    declared = param(*args, **kwargs)
+    return field(default=declared.default, metadata={**declared.metadata, 'read_only': True})
 
 
 def descriptor(f):

@@ -30,6 +30,7 @@ TOPICS = {
     'views/<camera>/extrinsics': (4, True),
     'views/<camera>/count': (1, False),
     'views/points': (1, False),
+    'views/refused': (4, False),
     'pixels/probabilities': (4, False),
     'pixels/<camera>/labels': (1, False),
     'candidates/poses': (4, False),

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the lifecycle nodes share: parameters, transitions that explain failures, endpoints."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 import functools
 import json
 import os
@@ -11,10 +11,10 @@ import traceback
 
 from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
-from hooc_perception.ros.diagnostics import Diagnostics
+from hooc_perception.ros.diagnostics import Diagnostics, WARN
 from hooc_perception.ros.memory import give_back_memory
 from hooc_perception.ros.misaddressed import misaddressed
-from hooc_perception.ros.parameters import Parameters
+from hooc_perception.ros.parameters import fixed_param, Parameters
 from hooc_perception.ros.qos import overridable, qos
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
@@ -23,12 +23,6 @@ from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 PROFILES = ('paper', 'best', 'fast')
 # What a node says last goes with its publishers: so long may its arrival take.
 FAREWELL_S = 1.0
-
-
-def fixed_param(*args, **kwargs):
-    """Declare a parameter that never changes after the node has started; as `param`."""
-    declared = param(*args, **kwargs)
-    return field(default=declared.default, metadata={**declared.metadata, 'read_only': True})
 
 
 @dataclass(frozen=True)
@@ -176,6 +170,7 @@ class StageNode(LifecycleNode):
             LifecycleNode.on_configure(self, state)
         if self._attempt('configure', build):
             self._report_misaddressed()
+            self._say_inactive('configured')
             return TransitionCallbackReturn.SUCCESS
         self._destroy()
         return TransitionCallbackReturn.FAILURE
@@ -187,6 +182,7 @@ class StageNode(LifecycleNode):
             LifecycleNode.on_activate(self, state)
             self.activate()
             self.active = True
+            self.diagnostics.state('node', 'ok', 'ok')
         if self._attempt('activate', start):
             return TransitionCallbackReturn.SUCCESS
         LifecycleNode.on_deactivate(self, state)    # a node that stays inactive is silent
@@ -194,12 +190,14 @@ class StageNode(LifecycleNode):
 
     def on_deactivate(self, state):
         """Silence the node; what was built stays."""
-        self._stop()
+        if self._stop():
+            self._say_inactive('deactivated')
         return LifecycleNode.on_deactivate(self, state)
 
     def on_cleanup(self, state):
         """Forget what was built."""
         self._destroy()
+        self._say_inactive('cleaned up', 'configure and activate it')
         return TransitionCallbackReturn.SUCCESS
 
     def on_shutdown(self, state):
@@ -223,17 +221,17 @@ class StageNode(LifecycleNode):
                     seconds=max(0.0, deadline - time.monotonic())))
 
     def _stop(self):
-        """Deactivate while the publishers still speak; return whether the node was active."""
+        """Deactivate while the publishers still speak; return whether an active node did."""
         was, self.active = self.active, False
-        if was:
-            self._attempt('deactivate', self.deactivate)
-        return was
+        return was and self._attempt('deactivate', self.deactivate)
+
+    def _say_inactive(self, what, mend='activate it'):
+        self.diagnostics.state('node', 'not_active', f'{what}, so nothing is done: {mend}', WARN)
 
     def _attempt(self, what, step):
         """Return whether `step()` went through; log the sentence or the surprise otherwise."""
         try:
             step()
-            self.diagnostics.succeeded()
             return True
         except HoocError as error:
             self.diagnostics.failed(f'{what}_failed', str(error))

@@ -2,9 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes in this process, beside a node of the test, on a domain of their own."""
 
+from dataclasses import replace
 import time
 
+from hooc_perception.core.geometry import pose_from_matrix
+from hooc_perception.core.types import Energy, ParsedScene
+from hooc_perception.models.derive import derive
+from hooc_perception.models.folder import save_model_folder
+from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera
+import numpy as np
 import pytest
+import trimesh
 
 
 class Bench:
@@ -79,3 +87,121 @@ def cheap():
                            'propose.per_category': 2},
         'parsing_node': {'parse.rounds': 0, 'parse.polish_steps': 0, 'parse.patience': 0,
                          'parse.finalists': 1}}
+
+
+class Stages:
+    """Stages that note their input and answer from it, so that one wrong bit spreads."""
+
+    def __init__(self, scene):
+        self.views, self.p, self.candidates, self.models = scene
+        self.given, self.chosen, self.refuse, self.turns = {}, [0, 2], None, ()
+
+    def classify(self, observation, classifier, config):
+        self.given['classify'] = observation, classifier
+        self.refuse_in('classify')
+        return self.p
+
+    def propose(self, observation, probabilities, models, config, rng):
+        self.given['propose'] = observation, probabilities, models, rng.random()
+        self.refuse_in('propose')
+        pool = self.candidates
+        return type(pool)(pool.category, pool.translation * 1.0000001, pool.rotation_xyzw,
+                          pool.size, pool.score)
+
+    def parse(self, observation, probabilities, pool, models, config, rng, max_instances=0,
+              more=None, verifier=None):
+        self.asked = [more(pool.take(self.chosen), turn) for turn in self.turns]
+        self.given['parse'] = observation, probabilities, pool, rng.random(), max_instances
+        self.refuse_in('parse')
+        n = len(self.chosen)
+        return ParsedScene(pool.take(self.chosen), Energy(0.5, 0.25, 0.125),
+                           np.full(n, 0.9, np.float32), np.full(n, 0.01, np.float32),
+                           np.full(n, 3.0, np.float32), np.full(n, 2, np.uint8), pool)
+
+    def refuse_in(self, stage):
+        """Raise what `refuse` = (stage, error) names for this stage."""
+        if self.refuse and self.refuse[0] == stage:
+            raise self.refuse[1]
+
+
+@pytest.fixture(scope='session')
+def folder(tmp_path_factory):
+    """Return a MODEL folder of three simple things, seen by one small camera."""
+    rng = np.random.default_rng(0)
+    meshes = {'box': trimesh.creation.box((0.1, 0.06, 0.08)),
+              'ball': trimesh.creation.icosphere(2, 0.05),
+              'can': trimesh.creation.cylinder(0.04, 0.12)}
+    models = [derive(name, mesh, rng, 200, 100) for name, mesh in meshes.items()]
+    return save_model_folder(tmp_path_factory.mktemp('model') / 'm', 'm', models,
+                             {'kind': np.zeros(1)}, 'fast', 3, (overhead_camera(),), 1)
+
+
+@pytest.fixture
+def make_chain(bench, folder, monkeypatch):
+    """
+    Return a function that brings up the four nodes with Stages instead of the real ones.
+
+    It takes the names of the cameras and {node: parameters}, puts the active nodes into
+    `bench.chain` and returns (stages, function that sends images of one stamp).
+    """
+    from geometry_msgs.msg import TransformStamped
+    from hooc_perception.nodes import (
+        candidate_node,
+        classification_node,
+        ingestion_node,
+        parsing_node,
+    )
+    from hooc_perception.ros import conversions as c
+    from hooc_perception.ros.qos import qos
+    from rclpy.lifecycle import TransitionCallbackReturn
+    from sensor_msgs.msg import CameraInfo, Image
+    kinds = (ingestion_node.IngestionNode, classification_node.ClassificationNode,
+             candidate_node.CandidateNode, parsing_node.ParsingNode)
+
+    def make(names=('overhead',), parameters=None, active=range(4)):
+        cameras = {name: replace(overhead_camera(), name=name) for name in names}
+        stages = Stages(made_up_scene(folder.models, tuple(cameras.values())))
+        monkeypatch.setattr(classification_node, 'classify', stages.classify)
+        monkeypatch.setattr(candidate_node, 'propose', stages.propose)
+        monkeypatch.setattr(parsing_node, 'parse', stages.parse)
+        common = {'model': str(folder.path), 'cameras': list(names), 'seed': 5, 'warm_up': False}
+        bench.chain = [bench.add(kind, **common, **(parameters or {}).get(i, {}))
+                       for i, kind in enumerate(kinds)]
+        peer, topics = bench.peer, {}
+        for name in names:
+            topics[name] = [peer.create_publisher(kind, f'{name}/{suffix}',
+                                                  qos(f'<camera>/{suffix}'))
+                            for kind, suffix in ((CameraInfo, 'depth/camera_info'),
+                                                 (Image, 'depth/image_raw'),
+                                                 (TransformStamped, 'extrinsics'))]
+        for i, node in enumerate(bench.chain):
+            assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS, (
+                bench.reasons(node))
+            if i in active:
+                assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
+        for name, (infos, images, poses) in topics.items():
+            poses.publish(c.transform_message(
+                *pose_from_matrix(cameras[name].T_world_camera), c.header(0, 'table'),
+                f'{name}_optical'))
+            assert bench.spin(lambda: images.get_subscription_count()
+                              and infos.get_subscription_count() and peer.count_subscribers(
+                                  f'/hooc/views/{name}/depth_rect') == 3)
+        bench.rest(0.3)
+
+        def send(shift_s=0.0, only=names, stamp=None):
+            stamp = stamp or peer.get_clock().now().nanoseconds + int(shift_s * 1e9)
+            for name in only:
+                head = c.header(stamp, f'{name}_optical')
+                topics[name][0].publish(c.camera_info_message(cameras[name], head))
+                topics[name][1].publish(c.depth_message(
+                    stages.views[names.index(name)].depth, head))
+            return stamp
+        return stages, send
+    return make
+
+
+@pytest.fixture
+def chain(bench, make_chain):
+    """Return (stages, bench with the active chain, function that sends one frame set)."""
+    stages, send = make_chain()
+    return stages, bench, send

@@ -11,116 +11,28 @@ from dataclasses import replace
 import json
 
 from hooc_perception.core.observe import observe, rectify
-from hooc_perception.core.types import DepthView, Energy, ParsedScene
-from hooc_perception.errors import HoocError
-from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import save_model_folder
+from hooc_perception.core.types import DepthView
 import numpy as np
 import pytest
-import trimesh
 
 pytest.importorskip('rclpy')
 
-from geometry_msgs.msg import PoseArray, TransformStamped  # noqa: E402
-from hooc_perception.core.geometry import pose_from_matrix, stage_rng  # noqa: E402
-from hooc_perception.nodes import (  # noqa: E402
-    candidate_node,
-    classification_node,
-    ingestion_node,
-    parsing_node,
-)
-from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera  # noqa: E402
+from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.core.geometry import stage_rng  # noqa: E402
+from hooc_perception.nodes import parsing_node  # noqa: E402
+from hooc_perception.nodes.warm_up import overhead_camera  # noqa: E402
 from hooc_perception.ros import conversions as c  # noqa: E402
 from hooc_perception.ros.point_clouds import cloud_rows  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
 from hooc_perception.ros.stage_messages import candidates_from_messages  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
-from sensor_msgs.msg import CameraInfo, Image, PointCloud2  # noqa: E402
+from sensor_msgs.msg import PointCloud2  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 from std_srvs.srv import SetBool, Trigger  # noqa: E402
 from visualization_msgs.msg import Marker, MarkerArray  # noqa: E402
 
-NODES = (ingestion_node.IngestionNode, classification_node.ClassificationNode,
-         candidate_node.CandidateNode, parsing_node.ParsingNode)
-SEED = 5
-
-
-class Stages:
-    """Stages that note their input and answer from it, so that one wrong bit spreads."""
-
-    def __init__(self, scene):
-        self.views, self.p, self.candidates, self.models = scene
-        self.given, self.chosen, self.refuse, self.turns = {}, [0, 2], None, ()
-
-    def classify(self, observation, classifier, config):
-        self.given['classify'] = observation, classifier
-        return self.p
-
-    def propose(self, observation, probabilities, models, config, rng):
-        self.given['propose'] = observation, probabilities, models, rng.random()
-        pool = self.candidates
-        return type(pool)(pool.category, pool.translation * 1.0000001, pool.rotation_xyzw,
-                          pool.size, pool.score)
-
-    def parse(self, observation, probabilities, pool, models, config, rng, max_instances=0,
-              more=None, verifier=None):
-        self.asked = [more(pool.take(self.chosen), turn) for turn in self.turns]
-        self.given['parse'] = observation, probabilities, pool, rng.random(), max_instances
-        if self.refuse:
-            raise HoocError(self.refuse)
-        n = len(self.chosen)
-        return ParsedScene(pool.take(self.chosen), Energy(0.5, 0.25, 0.125),
-                           np.full(n, 0.9, np.float32), np.full(n, 0.01, np.float32),
-                           np.full(n, 3.0, np.float32), np.full(n, 2, np.uint8), pool)
-
-
-@pytest.fixture(scope='module')
-def folder(tmp_path_factory):
-    """Return a MODEL folder of three simple things, seen by one small camera."""
-    rng = np.random.default_rng(0)
-    meshes = {'box': trimesh.creation.box((0.1, 0.06, 0.08)),
-              'ball': trimesh.creation.icosphere(2, 0.05),
-              'can': trimesh.creation.cylinder(0.04, 0.12)}
-    models = [derive(name, mesh, rng, 200, 100) for name, mesh in meshes.items()]
-    return save_model_folder(tmp_path_factory.mktemp('model') / 'm', 'm', models,
-                             {'kind': np.zeros(1)}, 'fast', 3, (overhead_camera(),), 1)
-
-
-@pytest.fixture
-def chain(bench, folder, monkeypatch):
-    """Return (stages, bench with the active chain, function that sends one frame set)."""
-    stages = Stages(made_up_scene(folder.models, folder.cameras))
-    monkeypatch.setattr(classification_node, 'classify', stages.classify)
-    monkeypatch.setattr(candidate_node, 'propose', stages.propose)
-    monkeypatch.setattr(parsing_node, 'parse', stages.parse)
-    bench.chain = [bench.add(kind, model=str(folder.path), seed=SEED, warm_up=False)
-                   for kind in NODES]
-    camera = overhead_camera()
-    peer = bench.peer
-    images = peer.create_publisher(Image, 'overhead/depth/image_raw',
-                                   qos('<camera>/depth/image_raw'))
-    infos = peer.create_publisher(CameraInfo, 'overhead/depth/camera_info',
-                                  qos('<camera>/depth/camera_info'))
-    poses = peer.create_publisher(TransformStamped, 'overhead/extrinsics',
-                                  qos('<camera>/extrinsics'))
-    for node in bench.chain:
-        assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS, bench.reasons(node)
-        assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
-    poses.publish(c.transform_message(*pose_from_matrix(camera.T_world_camera),
-                                      c.header(0, 'table'), 'overhead_optical'))
-    depth_topic = '/hooc/views/overhead/depth_rect'
-    assert bench.spin(lambda: images.get_subscription_count() and infos.get_subscription_count()
-                      and peer.count_subscribers(depth_topic) == 3)
-    bench.rest(0.3)
-
-    def send(shift_s=0.0):
-        stamp = peer.get_clock().now().nanoseconds + int(shift_s * 1e9)
-        head = c.header(stamp, 'overhead_optical')
-        infos.publish(c.camera_info_message(camera, head))
-        images.publish(c.depth_message(stages.views[0].depth, head))
-        return stamp
-    return stages, bench, send
+SEED = 5    # of make_chain
 
 
 def heard_answer(bench, stages):
@@ -317,7 +229,6 @@ def test_detect_survives_a_clock_that_is_set_back(chain):
     assert bench.spin(lambda: heard['objects/poses'])
     future = call(bench, Trigger, 'detect')
     bench.rest(0.2)
-    bench.chain[0].sent = None
     send(-100.0)        # a bag that starts again
     assert bench.spin(future.done)
     assert future.result().success, future.result().message
@@ -347,8 +258,9 @@ def test_enable_and_reset(chain):
     send()
     bench.rest(0.6)
     assert 'propose' in stages.given and 'parse' not in stages.given
-    bench.chain[0].sent = None      # nobody will answer this one
+    assert bench.reasons(bench.chain[3])['parse'][0] == 'disabled'
     assert bench.spin(call(bench, SetBool, 'enable', data=True).done)
+    assert bench.reasons(bench.chain[3])['parse'][0] == 'waiting'
     send()
     assert bench.spin(lambda: heard['objects/poses'] and heard['objects/markers'])
     assert bench.spin(call(bench, Trigger, 'reset').done)
@@ -376,17 +288,16 @@ def test_an_answer_that_nothing_follows_is_taken_back(chain):
     assert len(heard['objects/poses']) == n, 'it is taken back once'
 
 
-def test_a_refusing_stage_says_why_and_the_next_set_is_parsed(chain):
+def test_the_model_and_the_stage_have_a_status_before_the_first_frame(chain):
     stages, bench, send = chain
-    heard = heard_answer(bench, stages)
-    stages.refuse = 'the moon is too bright'
+    for node, stage in zip(bench.chain[1:], ('classify', 'propose', 'parse')):
+        status = {s.name.partition(': ')[2]: s for s in node.diagnostics.statuses()}
+        assert bench.reasons(node)[stage][0] == 'waiting' and status[stage].level == b'\0'
+        values = {v.key: v.value for v in status['model'].values}
+        assert values == {'reason': 'ok', 'name': 'm', 'profile': 'fast',
+                          'categories': 'box, ball, can'}
     send()
-    assert bench.spin(lambda: 'parse' in bench.reasons(bench.chain[3]))
-    assert bench.reasons(bench.chain[3])['parse'] == ('refused', 'the moon is too bright')
-    assert heard['objects/poses'] == []
-    stages.refuse, bench.chain[0].sent = None, None
-    send()
-    assert bench.spin(lambda: heard['objects/poses'])
+    assert bench.spin(lambda: bench.reasons(bench.chain[3])['parse'][0] == 'ok')
 
 
 def test_profile_and_overrides_give_the_stage_parameters(bench, folder):

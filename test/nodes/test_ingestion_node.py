@@ -18,7 +18,9 @@ from hooc_perception.ros import conversions as c  # noqa: E402
 from hooc_perception.ros.point_clouds import cloud_rows  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
+from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import CameraInfo, PointCloud2  # noqa: E402
+from std_msgs.msg import Header  # noqa: E402
 
 spec = importlib.util.spec_from_file_location('raw_camera', Path(__file__).with_name(
     'raw_camera.py'))
@@ -125,6 +127,36 @@ def test_next_set_waits_for_the_answer(bench):
     assert node.sets.drops['a', 'superseded'] == 2
 
 
+def test_a_refused_set_is_not_waited_for(bench):
+    node, (raw,), heard = start(bench, 'a', wait_for_answer_s=600.0)
+    bench.peer.create_publisher(PoseArray, 'objects/poses', qos('objects/poses'))
+    refusals = bench.peer.create_publisher(Header, 'views/refused', qos('views/refused'))
+    assert bench.spin(lambda: node.count_publishers('/hooc/objects/poses')
+                      and refusals.get_subscription_count())
+    raw.stand()
+    bench.rest(0.2)
+    for i in range(2):
+        raw.send(i * 10**8 + 1)
+        bench.rest(0.1)
+    assert len(heard['a']) == 1
+    refusals.publish(c.header(77, 'table'))     # of another set
+    bench.rest(0.2)
+    assert len(heard['a']) == 1
+    refusals.publish(c.header(1, 'table'))
+    assert bench.spin(lambda: len(heard['a']) == 2)
+    assert node.diagnostics._counts['chain', 'refused'] == 1
+
+
+def test_more_cameras_asked_for_than_there_are_is_said_while_running(bench):
+    node, (raw,), heard = start(bench, 'a')
+    raw.stand()
+    bench.rest(0.2)
+    assert node.set_parameters([Parameter('min_cameras', value=2)])[0].successful
+    raw.send(1)
+    assert bench.spin(lambda: bench.reasons(node).get('views', [''])[0] == 'too_few_cameras')
+    assert 'min_cameras is 2' in bench.reasons(node)['views'][1] and not heard['a']
+
+
 def test_fused_cloud_only_for_listeners(bench):
     node, (raw,), heard = start(bench, 'a')
     raw.stand()
@@ -160,6 +192,7 @@ def test_inactive_is_silent_and_everything_can_be_done_again(bench):
 
 @pytest.mark.parametrize('parameters, word', [
     ({'cameras': ['a', 'a']}, 'twice'), ({}, 'model is empty'),
+    ({'cameras': ['a', 'b'], 'min_cameras': 3}, 'min_cameras is 3'),
     ({'cameras': ['a'], 'extrinsics.a': [1.0, 2.0]}, 'extrinsics.a')])
 def test_bad_start_up_parameters(bench, parameters, word):
     node = bench.add(IngestionNode, **parameters)

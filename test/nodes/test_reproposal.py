@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parsing asks for more candidates in the middle of its work and gets them unchanged."""
 
+from dataclasses import replace
 import threading
 
 from hooc_perception.core.types import Candidates
@@ -12,6 +13,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.nodes.candidate_node import CandidateNode  # noqa: E402
 from hooc_perception.ros import reproposal  # noqa: E402
 from hooc_perception.ros.conversions import header  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
@@ -23,9 +25,10 @@ from std_msgs.msg import String  # noqa: E402
 
 def some(n, seed=0):
     rng = np.random.default_rng(seed)
+    rotation = rng.normal(size=(n, 4))
     return Candidates(rng.integers(1, 9, n).astype(np.uint16), rng.normal(size=(n, 3)),
-                      rng.normal(size=(n, 4)), rng.random((n, 3), np.float32),
-                      rng.random(n, np.float32))
+                      rotation / np.linalg.norm(rotation, axis=1)[:, None],
+                      rng.random((n, 3), np.float32), rng.random(n, np.float32))
 
 
 def same(a, b):
@@ -56,7 +59,7 @@ class Asking(StageNode):
         super().__init__('asking', StageConfig(), **kwargs)
 
     def configure(self):
-        self.more = reproposal.MoreCandidates(self)
+        self.more = reproposal.MoreCandidates(self, 8)
 
 
 @pytest.fixture
@@ -86,7 +89,7 @@ def asked(bench, node, stamp_ns, turn, timeout_s=10.0):
     """Return the thread that asks, and the list that will hold the answer."""
     got = []
     thread = threading.Thread(target=lambda: got.append(
-        node.more.asker(stamp_ns, timeout_s)(some(3), turn)))
+        node.more.asker(stamp_ns, timeout_s)(some(3), turn)), daemon=True)
     thread.start()
     return thread, got
 
@@ -122,3 +125,70 @@ def test_silence_brings_nothing_and_is_reported(bench, asking):
     thread.join(10)
     assert len(got[0]) == 0
     assert bench.reasons(node)['parse'][0] == 'no_more_candidates'
+
+
+@pytest.mark.parametrize('flaw', [{'category': np.array([9], np.uint16)},
+                                  {'rotation_xyzw': np.zeros((1, 4))}])
+def test_answers_of_another_model_bring_nothing(bench, asking, flaw):
+    node, answer, requests = asking
+    thread, got = asked(bench, node, 77, 1)
+    assert bench.spin(lambda: requests)
+    answer(replace(some(1), **flaw), 77, 1)
+    thread.join(10)
+    assert len(got[0]) == 0
+    code, sentence = bench.reasons(node)['parse']
+    assert code == 'no_more_candidates' and 'candidates' in sentence
+
+
+@pytest.fixture
+def proposing(bench, asking, folder):
+    """Return (asking node, active candidate node that it asks)."""
+    node = bench.add(CandidateNode, model=str(folder.path), warm_up=False)
+    node.trigger_configure()
+    node.trigger_activate()
+    topics = ('/hooc/candidates/requests', '/hooc/candidates/more/poses')
+    assert bench.spin(lambda: asking[0].count_subscribers(topics[0]) == 2
+                      and asking[0].count_publishers(topics[1]) == 2)
+    bench.rest(0.3)
+    return asking[0], node
+
+
+def answered(bench, node, stamp_ns, turn=1):
+    """Return what the candidate node answers; it has to, long before the patience ends."""
+    thread, got = asked(bench, node, stamp_ns, turn, timeout_s=300.0)
+    assert bench.spin(lambda: not thread.is_alive(), 20.0), 'still waiting'
+    return got[0]
+
+
+def test_the_last_few_sets_can_be_asked_for(bench, proposing):
+    asking, node = proposing
+    for stamp in range(1, 8):
+        node.proposers.keep(stamp, lambda objects, turn, stamp=stamp: some(stamp, turn))
+    assert len(node.proposers) == 4
+    same(answered(bench, asking, 4), some(4, 1))
+    # What is asked for is needed again in the next round.
+    for stamp in range(8, 11):
+        node.proposers.keep(stamp, None)
+    same(answered(bench, asking, 4, 2), some(4, 2))
+
+
+def test_a_forgotten_set_is_answered_at_once(bench, proposing):
+    asking, node = proposing
+    assert len(answered(bench, asking, 1)) == 0
+    assert bench.reasons(asking)['parse'][0] == 'no_more_candidates'
+    assert 'wait_for_answer_s' in bench.reasons(node)['propose'][1]
+
+
+def test_a_round_that_fails_is_answered(bench, proposing):
+    asking, node = proposing
+
+    def fail(objects, turn):
+        raise error
+    node.proposers.keep(1, fail)
+    for error in (HoocError('no such thing'), ValueError('a surprise')):
+        assert len(answered(bench, asking, 1)) == 0
+        assert any(str(error) in sentence for _, sentence in bench.reasons(node).values())
+    # Nothing to propose is an answer like any other, and no trouble.
+    node.proposers.keep(2, lambda objects, turn: some(0))
+    asking.diagnostics._counts.clear()
+    assert len(answered(bench, asking, 2)) == 0 and not asking.diagnostics._counts

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Days beside a robot, in short: nothing grows, and every frame is used or counted."""
 
+from collections import Counter, deque
 import gc
 import importlib.util
 from pathlib import Path
 
+from hooc_perception.core.observe import observe
+from hooc_perception.errors import HoocError
 import numpy as np
 import pytest
 
@@ -14,6 +17,8 @@ pytest.importorskip('rclpy')
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from hooc_perception.nodes.ingestion_node import IngestionNode  # noqa: E402
 from hooc_perception.ros import conversions as c  # noqa: E402
+from hooc_perception.ros import view_topics  # noqa: E402
+from hooc_perception.ros.qos import qos  # noqa: E402
 from hooc_perception.supervisor import environment  # noqa: E402
 import psutil  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
@@ -23,7 +28,7 @@ spec = importlib.util.spec_from_file_location('raw_camera', Path(__file__).with_
 raw_camera = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(raw_camera)
 
-SETS, MS = 2000, 10 ** 6
+SETS, STEPS, MS = 2000, 300, 10 ** 6
 
 
 def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
@@ -77,6 +82,65 @@ def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
     assert looped == 4 and jumps >= 3 and len(sent) > 0.85 * SETS and len(sent) == node.number
     assert memory[-1] - memory[1] < 8e6, memory
     assert objects[-1] - objects[1] < 2000, objects
+
+
+def held():
+    """Return how many entries all containers of this process have."""
+    gc.collect()
+    return sum(len(each) for each in gc.get_objects()
+               if isinstance(each, (list, dict, set, deque)))
+
+
+def test_hundreds_of_sets_with_drop_outs_and_refusals_through_the_chain(bench, make_chain,
+                                                                        monkeypatch):
+    """Every set is answered or refused for a reason, by the set; and nothing is kept of it."""
+    rng, names = np.random.default_rng(0), ('a', 'b', 'c')
+    stages, send = make_chain(names, {
+        0: {'wait_for_answer_s': 600.0, 'camera_timeout_s': 0.3, 'max_frame_age_s': 0.0,
+            'explain_after_s': 0.0}, 3: {'sigmas': False}})
+    seen = observe(stages.views)
+    monkeypatch.setattr(view_topics, 'observe', lambda views, config: seen)
+    ingestion = bench.chain[0]
+    clock, away, given, refused = [10 ** 18], dict.fromkeys(names, 0), 0, Counter()
+    for node in bench.chain:
+        node.now_ns = lambda: clock[0]
+    answers, held_by = [0], []
+
+    def count(_):
+        answers[0] += 1
+    bench.peer.create_subscription(PoseArray, 'objects/poses', count, qos('objects/poses'))
+
+    def settled():
+        sets = ingestion.sets
+        heard = sets.used.total() + sets.drops.total() + len(names) - len(sets.missing())
+        return heard == given and ingestion.sent is None
+    for i in range(STEPS):
+        clock[0] += 100 * MS
+        for name in names:
+            if rng.random() < 0.02:
+                away[name] = i + int(rng.integers(2, 10))
+        there = [name for name in names if away[name] <= i]
+        stage = str(rng.choice(['classify', 'propose', 'parse'])) if rng.random() < 0.1 else None
+        stages.refuse = stage and (stage, HoocError('not this one'))
+        before = ingestion.number
+        send(only=there, stamp=clock[0])
+        given += len(there)
+        assert bench.spin(settled), (i, there, stage, [bench.reasons(n) for n in bench.chain])
+        refused[stage] += ingestion.number - before
+        if i % 100 == 99:
+            held_by.append(held())
+    assert bench.spin(lambda: answers[0] == refused[None])
+    told = {stage: node.diagnostics._counts[stage, 'refused']
+            for stage, node in zip(('classify', 'propose', 'parse'), bench.chain[1:])}
+    del refused[None]
+    assert told == refused and min(told.values()) > 2
+    assert ingestion.diagnostics._counts['chain', 'refused'] == refused.total()
+    assert ingestion.number == answers[0] + refused.total() > 0.7 * STEPS
+    assert not ingestion.diagnostics._counts['chain', 'no_answer']
+    # Sets of fewer cameras, and frames that waited for them.
+    assert ingestion.sets.used['a'] < ingestion.number and ingestion.sets.drops.total() > 5
+    # One entry a set in any of them would be some eighty.
+    assert held_by[-1] - held_by[-2] < 50, held_by
 
 
 @pytest.mark.slow

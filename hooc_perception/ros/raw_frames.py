@@ -19,9 +19,6 @@ from hooc_perception.errors import HoocError
 from hooc_perception.ros.conversions import camera_from_messages, depth_from_message
 import numpy as np
 
-# A wrong unit does not come and go: one image in so many is looked at for it.
-LOOK_EVERY = 10
-
 
 class FrameRefused(HoocError):
     """A frame that cannot be used; `code` is the reason in short."""
@@ -54,7 +51,7 @@ class RawFrames:
     """
 
     def __init__(self, name):
-        self.name, self.camera, self._seen = name, None, 0
+        self.name, self.camera = name, None
         self._key = self._known = None
         self._history = deque(maxlen=1)
 
@@ -72,9 +69,7 @@ class RawFrames:
                 'size_mismatch', f'the depth image of camera {self.name} is {image.width} x '
                 f'{image.height} pixels, but its camera_info is for {camera.width} x '
                 f'{camera.height}; publish both at the same resolution')
-        self._seen += 1
-        if camera is not self.camera or self._seen % LOOK_EVERY == 1:
-            _refuse('wrong_unit', unit_trouble(depth, image.encoding, max_depth_m))
+        _refuse('wrong_unit', unit_trouble(depth, image.encoding, max_depth_m))
         _refuse('no_readings', reading_trouble(depth))
         if self.camera is not None and not same_calibration(camera, self.camera):
             self._history.clear()

@@ -15,7 +15,8 @@ from hooc_perception.core.types import DepthView, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names
 from hooc_perception.nodes.warm_up import overhead_camera
-from hooc_perception.ros.camera_input import CameraInput, declared_pose, TfPoses
+from hooc_perception.ros.camera_input import CameraInput
+from hooc_perception.ros.camera_poses import PoseParameters, TfPoses
 from hooc_perception.ros.conversions import nanoseconds
 from hooc_perception.ros.frame_sets import EXPLAINED, FrameSetConfig, FrameSets, SILENT
 from hooc_perception.ros.raw_frames import FrameRefused, RawFrames
@@ -54,6 +55,7 @@ class IngestionNode(StageNode):
     def __init__(self, **kwargs):
         """Declare parameters."""
         super().__init__('ingestion_node', IngestionConfig(), ('observe',), **kwargs)
+        self.poses = PoseParameters(self)
 
     def configure(self):
         """Build the assembly and the endpoints of every camera."""
@@ -67,8 +69,10 @@ class IngestionNode(StageNode):
         self.table_seen = -LOOK_FOR_TABLE_S
         self.output = ViewOutput(self, self.names)
         self.subscription(PoseArray, 'objects/poses', self.on_answer)
-        tf = TfPoses(self)
-        self.inputs = [CameraInput(self, name, declared_pose(self, name), tf, self.on_frame)
+        for name in self.names:
+            self.poses.declare(name)
+        self.tf = TfPoses(self)
+        self.inputs = [CameraInput(self, name, self.poses, self.tf, self.on_frame)
                        for name in self.names]
         self.steady_timer(0.5, self.on_timer)
 
@@ -77,7 +81,7 @@ class IngestionNode(StageNode):
         self.sets.clear()
         self.sent = None
         for camera in self.inputs:
-            camera.heard = time.monotonic()
+            camera.begin()
 
     def on_frame(self, name, image, info, transform):
         """Take one calibrated raw image; send a set when one is complete."""
@@ -93,6 +97,7 @@ class IngestionNode(StageNode):
         reason = self.sets.add(name, nanoseconds(image.header.stamp), frame, self.now_ns())
         if reason == 'time_jump':
             self.sent = None
+            self.tf.clear()
             for other in self.frames.values():
                 other.forget()
         if reason in (None, 'superseded', 'time_jump'):

@@ -72,6 +72,8 @@ class Buffer:
         known = self.moving.setdefault(source, {})
         if not known or stamp_ns > max(known) - 10 * S:
             known[stamp_ns] = z
+        for old in [t for t in known if t < max(known) - 10 * S]:
+            del known[old]
 
     def lookup_transform(self, target, source, time):
         known = self.moving.get(source)
@@ -145,7 +147,8 @@ def test_poses_of_before_a_loop_are_forgotten(bench, tf):
     node, (raw,), heard = start(bench, 'a')
     buffer = tf[0][0]
     for loop in range(2):
-        for stamp in range(100, 131, 5):
+        # The second time not as far as tf2 would mix the old with the new.
+        for stamp in range(100, 116 if loop else 131, 5):
             buffer.say('a_optical', stamp * S, 1.0 + 0.1 * loop)
             raw.send(stamp * S)
             bench.rest(0.03)

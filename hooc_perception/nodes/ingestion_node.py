@@ -42,8 +42,8 @@ class IngestionConfig(FrameSetConfig, StageConfig):
         'it goes out anyway. 0 never waits.', 's', 0.0, 600.0, runtime=True)
     fuse_frames: int = param(
         1, 'Median of the last so many frames of each camera, against noise, for scenes that '
-        'stand still; an odd number is best. What moves starts it anew. 1 = off.', '', 1, 30,
-        runtime=True)
+        'stand still; an odd number is best. Where the depth changes it begins anew. 1 = off.',
+        '', 1, 30, runtime=True)
     explain_after_s: float = param(
         3.0, 'A camera from which nothing comes is explained after this time, and again while '
         'it stays silent; 0 = never.', 's', 0.0, 3600.0, runtime=True)
@@ -103,8 +103,7 @@ class IngestionNode(StageNode):
         if reason in (None, 'superseded', 'time_jump'):
             if lost:
                 frames.forget()
-            if frames.remember(frame.depth, self.config.fuse_frames):
-                self.diagnostics.count(name, 'scene_moved')
+            frames.remember(frame.depth, self.config.fuse_frames)
             if reason != 'time_jump' and name not in self.sets.lost:
                 self.diagnostics.ok(name)
         self.send_if_complete()

@@ -61,11 +61,13 @@ class ReplayNode(StageNode):
             for name in self.cameras}
         self.status = self.publisher(String, 'replay/status')
         self.subscription(PoseArray, 'objects/poses', self.on_answer)
+        self.timer = self.steady_timer(0.002, self.on_timer)
+        self.timer.cancel()     # runs while active
 
     def activate(self):
         """Start to wait for subscribers."""
         self.began, self.player = self.now_ns(), None
-        self.timer = self.steady_timer(0.002, self.on_timer)
+        self.timer.reset()
         self.say('waiting')
 
     def deactivate(self):

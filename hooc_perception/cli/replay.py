@@ -15,7 +15,8 @@ def add_arguments(parser):
     parser.add_argument('bag', type=Path, metavar='BAG')
     parser.add_argument('--rate', type=float, default=1.0, metavar='R',
                         help='speed; 0 = as fast as the chain answers (default: %(default)g)')
-    parser.add_argument('--loop', action='store_true', help='start again at the end')
+    parser.add_argument('--loop', action='store_true',
+                        help='start again at the end, one frame period after the last image')
     parser.add_argument('--wait', type=float, default=30.0, metavar='S',
                         help='give up when nobody listens after so long (default: %(default)g s)')
     parser.add_argument('--namespace', default='/hooc', help='default: %(default)s')

@@ -78,16 +78,16 @@ def check_bag(path):
 def check_remains(path):
     """Yield what can still be read of a damaged bag."""
     try:
-        found = salvaged(path)
+        found = salvaged(path, keep=False)
     except HoocError as error:
         yield Finding(ERROR, 'salvage', str(error))
         return
     for note in list(dict.fromkeys(found.notes))[:5]:
         yield Finding(WARNING, 'damage', f'{note}; copy the bag again if there is another copy')
-    images = sum(kind == IMAGE for _, kind, *_ in found.messages)
-    if found.messages:
-        yield Finding(WARNING, 'salvage', f'{len(found.messages)} messages, {images} of them '
-                      'images, can still be read; save them with --salvage NEW_BAG')
+    if found.counts:
+        yield Finding(WARNING, 'salvage', f'{found.counts.total()} messages, '
+                      f'{found.counts[IMAGE]} of them images, can still be read; save them with '
+                      '--salvage NEW_BAG')
     else:
         yield Finding(ERROR, 'salvage', 'no message can be read any more; record again')
 

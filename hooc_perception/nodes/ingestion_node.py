@@ -14,7 +14,8 @@ from hooc_perception.core.types import DepthView, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names
 from hooc_perception.nodes.warm_up import overhead_camera
-from hooc_perception.ros.camera_input import CameraInput, declared_pose, TfPoses
+from hooc_perception.ros.camera_input import CameraInput
+from hooc_perception.ros.camera_poses import PoseParameters, TfPoses
 from hooc_perception.ros.conversions import nanoseconds
 from hooc_perception.ros.frame_sets import EXPLAINED, FrameSetConfig, FrameSets, SILENT
 from hooc_perception.ros.raw_frames import FrameRefused, RawFrames, rectified_count
@@ -41,8 +42,8 @@ class IngestionConfig(FrameSetConfig, StageConfig):
         'it goes out anyway. 0 never waits.', 's', 0.0, 600.0, runtime=True)
     fuse_frames: int = param(
         1, 'Median of the last so many frames of each camera, against noise, for scenes that '
-        'stand still; an odd number is best. What moves starts it anew. 1 = off.', '', 1, 30,
-        runtime=True)
+        'stand still; an odd number is best. Where the depth changes it begins anew. 1 = off.',
+        '', 1, 30, runtime=True)
     explain_after_s: float = param(
         3.0, 'A camera from which nothing comes is explained after this time, and again while '
         'it stays silent; 0 = never.', 's', 0.0, 3600.0, runtime=True)
@@ -54,6 +55,7 @@ class IngestionNode(StageNode):
     def __init__(self, **kwargs):
         """Declare parameters."""
         super().__init__('ingestion_node', IngestionConfig(), ('observe',), **kwargs)
+        self.poses = PoseParameters(self)
 
     def configure(self):
         """Build the assembly and the endpoints of every camera."""
@@ -70,8 +72,10 @@ class IngestionNode(StageNode):
         self.output = ViewOutput(self, self.names)
         self.subscription(PoseArray, 'objects/poses', self.on_answer)
         self.subscription(Header, 'views/refused', self.on_refused)
-        tf = TfPoses(self)
-        self.inputs = [CameraInput(self, name, declared_pose(self, name), tf, self.on_frame)
+        for name in self.names:
+            self.poses.declare(name)
+        self.tf = TfPoses(self)
+        self.inputs = [CameraInput(self, name, self.poses, self.tf, self.on_frame)
                        for name in self.names]
         self.steady_timer(0.5, self.on_timer)
 
@@ -80,7 +84,7 @@ class IngestionNode(StageNode):
         self.sets.clear()
         self.sent = None
         for camera in self.inputs:
-            camera.heard = time.monotonic()
+            camera.begin()
 
     def on_frame(self, name, image, info, transform):
         """Take one calibrated raw image; send a set when one is complete."""
@@ -96,13 +100,13 @@ class IngestionNode(StageNode):
         reason = self.sets.add(name, nanoseconds(image.header.stamp), frame, self.now_ns())
         if reason == 'time_jump':
             self.sent = None
+            self.tf.clear()
             for other in self.frames.values():
                 other.forget()
         if reason in (None, 'superseded', 'time_jump'):
             if lost:
                 frames.forget()
-            if frames.remember(frame.depth, self.config.fuse_frames):
-                self.diagnostics.count(name, 'scene_moved')
+            frames.remember(frame.depth, self.config.fuse_frames)
             if reason != 'time_jump' and name not in self.sets.lost:
                 self.diagnostics.ok(name)
         self.send_if_complete()

@@ -63,11 +63,13 @@ class ReplayNode(StageNode):
         self.subscription(PoseArray, 'objects/poses',
                           lambda message: self.go_on(message.header.stamp))
         self.subscription(Header, 'views/refused', lambda message: self.go_on(message.stamp))
+        self.timer = self.steady_timer(0.002, self.on_timer)
+        self.timer.cancel()     # runs while active
 
     def activate(self):
         """Start to wait for subscribers."""
         self.began, self.player = self.now_ns(), None
-        self.timer = self.steady_timer(0.002, self.on_timer)
+        self.timer.reset()
         self.say('waiting')
 
     def deactivate(self):

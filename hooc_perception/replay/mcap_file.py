@@ -7,6 +7,7 @@ The format: magic, then records of an opcode, a length and that many bytes; most
 in chunk records (https://mcap.dev/spec).
 """
 
+from collections import Counter
 from dataclasses import dataclass, field
 import io
 import struct
@@ -21,9 +22,13 @@ import zstandard
 
 MAGIC = b'\x89MCAP0\r\n'
 # ROS writes chunks below one megabyte; a bigger one than this was made to fill the memory.
-MAX_CHUNK_BYTES = 1 << 30
+MAX_CHUNK_BYTES = 1 << 28
 # What is read into memory as a whole, to be sealed or salvaged.
 MOST_BYTES = 4 << 30
+# Messages of more than so many bytes, and of more than so many times the size of their file, are
+# no more salvaged: depth does not pack so well.
+MOST_SALVAGED, MOST_PACKED = 1 << 30, 8
+MOST_NOTES = 1000
 _HEAD = struct.Struct('<BQ')
 _CRC_AT = 24            # of a chunk's content: behind two times and the size
 _PIECE = 1 << 20
@@ -145,19 +150,50 @@ def _unpacked(chunk):
 @dataclass
 class Salvage:
     """
-    What could be read of a damaged file.
+    What could be read of damaged files.
 
+    :ivar size: of the files, in bytes; bounds what is read.
+    :ivar keep: whether messages are kept or only counted.
+    :ivar readable: callable (type, CDR bytes) -> whether a message can be decoded.
     :ivar messages: list of (topic, message type, CDR bytes, time in ns, latched).
+    :ivar counts: Counter {message type: messages}.
     :ivar notes: what was wrong, one sentence part each.
+    :ivar full: whether there was more than can be meant; the rest was left.
     """
 
+    size: int = 0
+    keep: bool = True
+    readable: object = None
     messages: list = field(default_factory=list)
+    counts: Counter = field(default_factory=Counter)
     notes: list = field(default_factory=list)
+    full: bool = False
+    bytes: int = 0
+
+    def note(self, text):
+        """Note what was wrong."""
+        if len(self.notes) < MOST_NOTES:
+            self.notes.append(text)
+
+    def add(self, topic, kind, data, time_ns, latched):
+        """Take in a message."""
+        limit = max(MOST_SALVAGED, MOST_PACKED * self.size)
+        self.bytes += len(data)
+        if self.bytes > limit:
+            self.full = True
+            self.notes.insert(0, f'after {limit >> 20} MB of messages the rest is left, since no '
+                              f'recorder packs so much into {self.size} bytes')
+        elif self.readable and not self.readable(kind, data):
+            self.note(f'a message of {topic} is lost')
+        else:
+            self.counts[kind] += 1
+            if self.keep:
+                self.messages.append((topic, kind, data, time_ns, latched))
 
 
-def salvage(path):
+def salvage(path, found):
     """
-    Return the Salvage of an MCAP file, however it is damaged.
+    Add to a Salvage what can be read of an MCAP file, however it is damaged.
 
     Without its index, from the front; after a damaged record from the next whole chunk on;
     the last chunk of a file that was cut off, up to the cut.
@@ -165,7 +201,7 @@ def salvage(path):
     if path.stat().st_size > MOST_BYTES:
         raise HoocError(f'{path}: {path.stat().st_size} bytes are more than can be salvaged at '
                         'once; cut the file into pieces, which may begin and end anywhere')
-    data, found = path.read_bytes(), Salvage()
+    data = path.read_bytes()
     schemas, channels = {}, {}
     at = len(MAGIC) if data.startswith(MAGIC) else max(0, _next_chunk(data, 0))
     while at < len(data):
@@ -176,14 +212,15 @@ def salvage(path):
                 _take_chunk(data[start:end], schemas, channels, found, at)
             elif opcode in (Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE):
                 _take(opcode, data[start:end], schemas, channels, found)
+            if found.full:
+                return
         if end >= len(data) - len(MAGIC):
             break
-        found.notes.append(f'damaged at byte {end}')
+        found.note(f'damaged at byte {end}')
         at = _next_chunk(data, end + 1)
         if at < 0:
             _take_chunk(data[end + _HEAD.size:], schemas, channels, found, end)
             break
-    return found
 
 
 def _next_chunk(data, at):
@@ -204,14 +241,16 @@ def _take_chunk(content, schemas, channels, found, at):
         chunk = _chunk(content, 0, len(content))
         inside = _unpacked(chunk)
         if chunk.uncompressed_crc and crc32(inside) != chunk.uncompressed_crc:
-            found.notes.append(f'a bit is wrong somewhere in the chunk at byte {at}')
+            found.note(f'a bit is wrong somewhere in the chunk at byte {at}')
     except Exception:       # cut off, or its lengths are damaged: what follows the head
         if len(content) < 40 or struct.unpack_from('<I', content, 28)[0]:
-            found.notes.append(f'a chunk is lost at byte {at}')
+            found.note(f'a chunk is lost at byte {at}')
             return
         inside = content[40:]
-        found.notes.append(f'the chunk at byte {at} is not whole')
+        found.note(f'the chunk at byte {at} is not whole')
     for opcode, start, length in records(inside, 0):
+        if found.full:
+            return
         _take(opcode, inside[start:start + length], schemas, channels, found)
 
 
@@ -231,6 +270,6 @@ def _take(opcode, content, schemas, channels, found):
         elif opcode == Opcode.MESSAGE:
             message = Message.read(stream, len(content))
             topic, kind, latched = channels[message.channel_id]
-            found.messages.append((topic, kind, message.data, message.log_time, latched))
+            found.add(topic, kind, message.data, message.log_time, latched)
     except Exception as error:      # the bytes are damaged ones
-        found.notes.append(f'a record is lost ({type(error).__name__})')
+        found.note(f'a record is lost ({type(error).__name__})')

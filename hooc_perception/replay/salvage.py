@@ -14,13 +14,15 @@ from hooc_perception.replay.raw_writer import RawBagWriter
 
 # Rows of a database that are missing in a row before its end is believed.
 MOST_MISSING = 1000
+MOST_DATABASE_BYTES = 1 << 30
 
 
-def salvaged(path):
+def salvaged(path, keep=True):
     """
     Return the mcap_file.Salvage of a bag: its messages that can be read, in the order of time.
 
     :param path: a rosbag2 folder, with or without metadata.yaml, or its .mcap or .db3 file.
+    :param keep: False counts the messages without keeping them.
     :raises HoocError: where there is no such file.
     """
     path = Path(path)
@@ -30,13 +32,11 @@ def salvaged(path):
     if not files:
         raise HoocError(f'{path}: there is no .mcap or .db3 file, so nothing can be salvaged; '
                         'look for the recording elsewhere')
-    everything = mcap_file.Salvage()
+    found = mcap_file.Salvage(sum(file.stat().st_size for file in files), keep, _readable)
     for file in files:
-        found = mcap_file.salvage(file) if file.suffix != '.db3' else _salvage_database(file)
-        everything.notes += found.notes
-        everything.messages += [entry for entry in found.messages if _readable(entry, found)]
-    everything.messages.sort(key=lambda entry: entry[3])
-    return everything
+        (_salvage_database if file.suffix == '.db3' else mcap_file.salvage)(file, found)
+    found.messages.sort(key=lambda entry: entry[3])
+    return found
 
 
 def write_salvaged(found, out):
@@ -46,42 +46,38 @@ def write_salvaged(found, out):
             writer.write(topic, kind, data, time_ns, latched)
 
 
-def _readable(entry, found):
-    """Return whether a message can be decoded; note it where not."""
-    topic, kind, data = entry[:3]
+def _readable(kind, data):
+    """Return whether a message can be decoded."""
     try:
         TYPES.deserialize_cdr(data, kind)
         return True
     except Exception:       # damaged bytes fail in many ways; foreign types are not written
-        found.notes.append(f'a message of {topic} is lost')
         return False
 
 
-def _salvage_database(path):
-    """Return the Salvage of an SQLite bag, row by row around what is damaged."""
-    found = mcap_file.Salvage()
+def _salvage_database(path, found):
+    """Add to a Salvage what an SQLite bag holds, row by row around what is damaged."""
     try:
         with closing(sqlite3.connect(':memory:')) as base:
             base.deserialize(_padded(path))
             topics = _topics(base)
             # Found by their number, rows are reached past a page that is damaged.
             missing, number = 0, 0
-            while missing < MOST_MISSING:
+            while missing < MOST_MISSING and not found.full:
                 number += 1
                 row = _row(base, number, found)
                 missing = 0 if row else missing + 1
                 if row and row[0] in topics:
                     topic, kind, latched = topics[row[0]]
-                    found.messages.append((topic, kind, bytes(row[2]), int(row[1]), latched))
+                    found.add(topic, kind, bytes(row[2]), int(row[1]), latched)
     except (sqlite3.Error, TypeError, ValueError) as error:
         reason = ' '.join(str(error).split())[:120]
-        found.notes.append(f'the database cannot be read further ({reason})')
-    return found
+        found.note(f'the database cannot be read further ({reason})')
 
 
 def _padded(path):
     """Return a database file's bytes, filled up with zeros where it was cut off."""
-    if path.stat().st_size > mcap_file.MAX_CHUNK_BYTES:
+    if path.stat().st_size > MOST_DATABASE_BYTES:
         raise ValueError('it has more than one gigabyte; salvage it with "sqlite3 FILE .recover"')
     data = path.read_bytes()
     if len(data) < 100 or not data.startswith(b'SQLite format 3\0'):
@@ -106,5 +102,5 @@ def _row(base, number, found):
         return base.execute('SELECT topic_id, timestamp, data FROM messages WHERE id = ?',
                             (number,)).fetchone()
     except sqlite3.Error:
-        found.notes.append('a row of the database is damaged')
+        found.note('a row of the database is damaged')
         return None

@@ -7,52 +7,11 @@ import time
 
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.errors import HoocError
+from hooc_perception.ros.camera_poses import PoseNotYet
 from hooc_perception.ros.conversions import header, nanoseconds, transform_message
 from hooc_perception.ros.qos import auto_reliability, overridable, qos
 from hooc_perception.ros.silence import why_silent
-from rcl_interfaces.msg import ParameterDescriptor
 from sensor_msgs.msg import CameraInfo, Image
-
-try:    # Not on PyPI; there on a ROS installation.
-    from rclpy.time import Time
-    from tf2_ros import Buffer, TransformException, TransformListener
-except ImportError:
-    Buffer = None
-
-
-class TfPoses:
-    """Camera poses from /tf and /tf_static, where tf2 is installed; else always None."""
-
-    def __init__(self, node):
-        """Listen for `node`."""
-        self._buffer = Buffer() if Buffer else None
-        self._listener = TransformListener(self._buffer, node) if Buffer else None
-
-    def lookup(self, target, source):
-        """Return the TransformStamped T_target_source, or None."""
-        if self._buffer is None or not source:
-            return None
-        try:
-            return self._buffer.lookup_transform(target, source, Time())
-        except TransformException:
-            return None
-
-
-def declared_pose(node, name):
-    """
-    Return the seven numbers x y z qx qy qz qw of parameter `extrinsics.<camera>`, or ().
-
-    :raises HoocError: for another number of numbers.
-    """
-    key = f'extrinsics.{name}'
-    if not node.has_parameter(key):
-        node.declare_parameter(key, [], ParameterDescriptor(
-            dynamic_typing=True, description=f'Pose of the optical frame of {name} in the target '
-            'frame: x y z qx qy qz qw; empty takes topics or tf. [m]'))
-    pose = tuple(node.get_parameter(key).value)
-    if len(pose) not in (0, 7):
-        raise HoocError(f'parameter {key} has {len(pose)} numbers; give x y z qx qy qz qw')
-    return tuple(float(x) for x in pose)
 
 
 class CameraInput:
@@ -60,15 +19,18 @@ class CameraInput:
     Subscribe to one camera; call back with (image, info, transform) messages that agree.
 
     :param node: a StageNode whose config has target_frame and image_reliability.
-    :param pose: seven numbers x y z qx qy qz qw (T_target_camera) or () for topics and tf.
+    :param poses: mapping of the name to x y z qx qy qz qw (T_target_camera), or to () where
+        topics and tf say it; looked at for every image.
+    :param tf: TfPoses.
     :param callback: called as callback(name, image, info, transform).
     """
 
-    def __init__(self, node, name, pose, tf, callback):
+    def __init__(self, node, name, poses, tf, callback):
         """Create the subscriptions; the executor serves them in the order of creation."""
         self.name, self.node, self._tf, self._callback = name, node, tf, callback
-        self._pose, self._latched = pose, None
+        self._poses, self._latched = poses, None
         self._infos, self._images, self._last_info = OrderedDict(), OrderedDict(), None
+        self._late = None               # (image, info) whose pose tf does not have yet
         # The stamp of the last image whose own camera_info did not come, 0 = all did.
         self._unmatched = 0
         self.heard = time.monotonic()   # when the last image came
@@ -78,6 +40,11 @@ class CameraInput:
         self._subscriptions = []
         node.owned(lambda _: self._unsubscribe(), None)
         self.adapt_reliability()
+
+    def begin(self):
+        """Begin to listen: what was heard before does not count."""
+        self.heard, self._late = time.monotonic(), None
+        self._images.clear()
 
     # Reliability.
 
@@ -167,21 +134,36 @@ class CameraInput:
             waiting.popitem(last=False)
 
     def _deliver(self, image, info):
+        """Hand on an image, or with the next one where its pose comes later than itself."""
+        late, self._late = self._late, None
+        trouble = late and self._hand_on(*late)
+        if trouble:
+            self.node.diagnostics.warn(self.name, 'late_extrinsics',
+                                       f'{trouble}; the image is dropped')
+        if self._hand_on(image, info):
+            self._late = image, info
+
+    def _hand_on(self, image, info):
+        """Call back with an image; return the PoseNotYet where its pose is still to come."""
         try:
             transform = self._extrinsics(image)
+        except PoseNotYet as error:
+            return error
         except HoocError as error:
             self.node.diagnostics.warn(self.name, 'no_extrinsics', str(error))
-            return
-        self._callback(self.name, image, info, transform)
+        else:
+            self._callback(self.name, image, info, transform)
+        return None
 
     def _extrinsics(self, image):
         """Return T_target_camera: from parameters, the latched topic or tf, in this order."""
         target, frame = self.node.config.target_frame, image.header.frame_id
-        if len(self._pose):
-            return transform_message(self._pose[:3], self._pose[3:], header(0, target), frame)
+        pose = self._poses[self.name]
+        if pose:
+            return transform_message(pose[:3], pose[3:], header(0, target), frame)
         if self._latched is not None and self._latched.header.frame_id == target:
             return self._latched
-        transform = self._tf.lookup(target, frame)
+        transform = self._tf.lookup(target, frame, image.header.stamp)
         if transform is not None:
             return transform
         if self._latched is not None:

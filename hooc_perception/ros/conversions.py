@@ -134,8 +134,7 @@ def camera_from_messages(name, info, transform):
         raise HoocError(f'camera_info of {name} has distortion coefficients D = {D.tolist()}; '
                         f'{model} takes {_COEFFICIENTS[model]} finite numbers')
     translation, rotation = pose_of_transform(transform)
-    norm = np.linalg.norm(rotation)
-    if not (np.isfinite(translation).all() and abs(norm - 1) < 1e-2):
+    if not is_rigid(translation, rotation):
         raise HoocError(f'the extrinsics of {name} are not a rigid transform (translation '
                         f'{translation.tolist()}, rotation {rotation.tolist()}); the quaternion '
                         'must have norm 1')
@@ -143,6 +142,11 @@ def camera_from_messages(name, info, transform):
         D = np.zeros(_COEFFICIENTS[model])
     return Camera(name, info.width, info.height, K, D,
                   canonical_pose(matrix_from_pose(translation, rotation)), model)
+
+
+def is_rigid(translation, rotation_xyzw):
+    """Return whether (3,) and (4,) numbers are finite and a quaternion of norm 1."""
+    return bool(np.isfinite(translation).all() and abs(np.linalg.norm(rotation_xyzw) - 1) < 1e-2)
 
 
 def pose_message(translation, rotation_xyzw):

@@ -11,6 +11,7 @@ from collections import Counter, OrderedDict
 from dataclasses import dataclass
 
 from hooc_perception.core.config import Config, param
+from hooc_perception.ros.set_back import SetBack
 
 # Why a frame is lost that the user would rather have kept, in words.
 EXPLAINED = {'stale': 'its stamp is too old by the clock of this node (wrong clock, or recorded '
@@ -39,7 +40,8 @@ class FrameSetConfig(Config):
         'freely are within 0.034 s.', 's', 0.0, 10.0, runtime=True)
     time_jump_s: float = param(
         1.0, 'A stamp that lies farther back than this behind the last one of its camera means '
-        'that time was set back (a looped bag): what waits is forgotten.', 's', 0.01, 3600.0)
+        'that time was set back (a looped bag): what waits is forgotten. So do old stamps from '
+        'all cameras, or several in a row from one.', 's', 0.01, 3600.0)
     camera_timeout_s: float = param(
         2.0, 'Sets go out without a camera that has not delivered for so long while others did, '
         'until it returns; longer than the pause between two frames of the slowest camera. 0 '
@@ -85,6 +87,7 @@ class FrameSets:
         self._arrival = {}              # camera -> node time of its last frame that was kept
         self._lag = {}                  # camera -> node time minus stamp of that frame
         self._now = None                # node time of the last call
+        self._set_back = SetBack()
 
     def add(self, camera, stamp_ns, frame, now_ns):
         """
@@ -104,16 +107,14 @@ class FrameSets:
             return self._drop(camera, 'future')
         last = self._last_stamp.get(camera)
         if last is not None and stamp_ns <= last:
-            if stamp_ns == last:
-                return self._drop(camera, 'duplicate')
-            if last - stamp_ns <= self.config.time_jump_s * 1e9:
-                return self._drop(camera, 'out_of_order')
-            for other in self._latest:
-                if other != camera:
-                    self._drop(other, 'time_jump')
-            self.clear()
-            self._keep(camera, stamp_ns, frame, now_ns)
-            return self._drop(camera, 'time_jump')
+            reason = 'duplicate' if stamp_ns == last else 'out_of_order'
+            if last - stamp_ns <= self.config.time_jump_s * 1e9 and (
+                    self._too_old(stamp_ns, now_ns) or not self._set_back.shown_by(
+                        camera, stamp_ns, frame, reason, self._wanted(),
+                        now_ns - self._arrival.get(camera, now_ns))):
+                return self._drop(camera, reason)
+            return self._jump(camera, stamp_ns, frame, now_ns)
+        self._set_back.newer(camera)
         if self._too_old(stamp_ns, now_ns):
             self._last_stamp[camera] = stamp_ns
             return self._drop(camera, 'stale')
@@ -138,7 +139,7 @@ class FrameSets:
         for camera in self.missing():
             self._missed.setdefault(camera, now_ns)
         self._give_up(now_ns)
-        wanted = [camera for camera in self.cameras if camera not in self.lost]
+        wanted = self._wanted()
         if not wanted or any(camera not in self._latest for camera in wanted):
             return None
         newest = max(self._latest[camera][0] for camera in wanted)
@@ -171,9 +172,32 @@ class FrameSets:
 
     def clear(self):
         """Forget all frames and stamps, but neither the counts nor who is lost."""
+        self._begin_anew()
+        self._missed.clear()
+
+    def _begin_anew(self):
         self._latest.clear()
         self._last_stamp.clear()
-        self._missed.clear()
+        self._set_back.clear()
+
+    def _wanted(self):
+        """Return the cameras that are not lost."""
+        return [camera for camera in self.cameras if camera not in self.lost]
+
+    def _jump(self, camera, stamp_ns, frame, now_ns):
+        """Begin anew with a frame, and those of other cameras that had seemed to be old."""
+        for other in self._latest:
+            if other != camera:
+                self._drop(other, 'time_jump')
+        fitting = self._set_back.fitting(camera, stamp_ns, self.config.max_set_spread_s * 1e9)
+        self._begin_anew()
+        for other, stray in fitting.items():
+            key = other, stray.reason
+            self.drops[key] -= 1        # it is used after all
+            self._told[key] = min(self._told[key], self.drops[key])
+            self._keep(other, stray.stamp_ns, stray.frame, now_ns)
+        self._keep(camera, stamp_ns, frame, now_ns)
+        return self._drop(camera, 'time_jump')
 
     def _keep(self, camera, stamp_ns, frame, now_ns):
         spread_ns = self.config.max_set_spread_s * 1e9
@@ -224,6 +248,7 @@ class FrameSets:
         if self._now is not None and now_ns < self._now:
             self._missed.clear()
             self._arrival = dict.fromkeys(self._arrival, now_ns)
+            self._set_back.clock_went_back(self.cameras)
         self._now = now_ns
 
     def _too_old(self, stamp_ns, now_ns):

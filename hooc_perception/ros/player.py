@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """When each recorded image is due, and with which stamp: pure, so that it can be tested."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 from hooc_perception.core.config import Config, param
@@ -23,7 +24,8 @@ class PlayerConfig(Config):
     rate: float = param(1.0, 'Speed: 1 as recorded; 0 sends a frame set when the last one is '
                         'answered on objects/poses, as fast as the chain takes them.', '', 0.0,
                         100.0)
-    loop: bool = param(False, 'Start again at the end.')
+    loop: bool = param(False, 'Start again at the end, one mean frame period after the last image '
+                       '(a bag of one frame set: one second).')
     restamp: bool = param(True, 'Give the images stamps of now, with the recorded distances (by '
                           'rate); without, the recorded ones.')
     min_gap_s: float = param(0.005, 'Least time between two images: large messages sent back to '
@@ -43,7 +45,9 @@ class Player:
         self._images, self.rate, self.restamp = images, config.rate, config.restamp
         self.loop, self._min_gap_ns = config.loop, round(config.min_gap_s * 1e9)
         self._iterator, self._next = iter(images()), None
-        self._start = self._first = None    # node time and recorded stamp of the first image
+        # Of this pass: node time and recorded stamp of the first image, images a camera.
+        self._start, self._first, self._sent = None, None, Counter()
+        self._not_before = 0                # node time
         self._last_time = None
         self._in_set = set()                # cameras sent since the last release
         self.set_stamp_ns = 0               # given to the first image of the latest set
@@ -59,6 +63,8 @@ class Player:
             return None
         camera, stamp, message = self._next
         if self._start is None:
+            if self.rate and now_ns < self._not_before:
+                return None
             self._start, self._first = now_ns, stamp
         when = self._start + round((stamp - self._first) / (self.rate or 1.0))
         if self.rate and now_ns < when:
@@ -73,7 +79,8 @@ class Player:
                 self.set_stamp_ns = when if self.restamp else stamp
             self._in_set.add(camera)
         self._last_time, self.published = now_ns, self.published + 1
-        self._advance()
+        self._sent[camera] += 1
+        self._advance(stamp, when)
         return Due(camera, when if self.restamp else stamp, message)
 
     @property
@@ -86,10 +93,15 @@ class Player:
         self._held = False
         self._in_set.clear()
 
-    def _advance(self):
+    def _advance(self, stamp=None, when=None):
+        """Read the next image; `stamp` and `when` are those of the last one."""
         self._next = next(self._iterator, None)
         if self._next is None and self.loop and self.published:
             self._iterator = iter(self._images())
             self._next = next(self._iterator)
+            images = max(self._sent.values())
+            period_ns = (stamp - self._first) / (images - 1) if images > 1 else 1e9
+            self._not_before = when + round(period_ns / (self.rate or 1.0))
             self._start = None
+            self._sent.clear()
         self.finished = self._next is None

@@ -2,12 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """One raw camera's messages -> a frame that the stages can use, or the reason why not."""
 
-from collections import deque
 from dataclasses import dataclass
 import textwrap
 
 from geometry_msgs.msg import TransformStamped
-from hooc_perception.core.fuse import fuse_depth, has_moved
+from hooc_perception.core.fuse import Fusion
 from hooc_perception.core.kernels.undistort import rectify_nearest
 from hooc_perception.core.plausible import (
     pose_trouble,
@@ -19,9 +18,6 @@ from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.conversions import camera_from_messages, depth_from_message
 import numpy as np
-
-# A wrong unit does not come and go: one image in so many is looked at for it.
-LOOK_EVERY = 10
 
 
 class FrameRefused(HoocError):
@@ -55,9 +51,9 @@ class RawFrames:
     """
 
     def __init__(self, name):
-        self.name, self.camera, self._seen = name, None, 0
+        self.name, self.camera = name, None
         self._key = self._known = None
-        self._history = deque(maxlen=1)
+        self._fusion = Fusion()
 
     def decode(self, image, info, transform, max_depth_m):
         """
@@ -73,41 +69,33 @@ class RawFrames:
                 'size_mismatch', f'the depth image of camera {self.name} is {image.width} x '
                 f'{image.height} pixels, but its camera_info is for {camera.width} x '
                 f'{camera.height}; publish both at the same resolution')
-        self._seen += 1
-        if camera is not self.camera or self._seen % LOOK_EVERY == 1:
-            _refuse('wrong_unit', unit_trouble(depth, image.encoding, max_depth_m))
+        _refuse('wrong_unit', unit_trouble(depth, image.encoding, max_depth_m))
         _refuse('no_readings', reading_trouble(depth))
         if self.camera is not None and not same_calibration(camera, self.camera):
-            self._history.clear()
+            self._fusion.forget()
         self.camera = camera
         return RawFrame(camera, depth, image.header.frame_id)
 
     def remember(self, depth, frames):
         """
-        Keep an image for fusion; return whether the scene has moved, so that the rest is gone.
+        Keep an image for fusion.
 
         :param frames: how many to keep; 1 keeps nothing of the past.
         """
-        moved = False
-        if self._history.maxlen != frames:
-            self._history = deque(self._history, maxlen=frames)
-        if frames > 1 and self._history:
-            before = self._history[-1]
-            moved = before.shape != depth.shape or has_moved(depth, before)
-        if moved:
-            self._history.clear()
-        self._history.append(depth)
-        return moved
+        if frames > 1:
+            self._fusion.add(depth, frames)
+        else:
+            self.forget()
 
     def forget(self):
         """Forget what was kept for fusion."""
-        self._history.clear()
+        self._fusion.forget()
 
     def view(self, frame):
         """Return the DepthView of a RawFrame, fused with what is remembered, and the counts."""
-        if len(self._history) < 2:
+        if len(self._fusion) < 2:
             return DepthView(frame.camera, frame.depth), None
-        depth, count = fuse_depth(np.stack(self._history))
+        depth, count = self._fusion.fused()
         return DepthView(frame.camera, depth), count
 
     def _camera(self, info, transform):

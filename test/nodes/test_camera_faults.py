@@ -335,7 +335,7 @@ def test_cameras_that_return_bring_no_old_frames(bench):
     run(bench, clock, raw, sets=6)
     assert run(bench, clock, raw[:1], lambda: 'b' in node.sets.lost)
     assert run(bench, clock, raw, lambda: 'b' not in node.sets.lost)
-    assert len(node.frames['b']._history) <= 2
+    assert len(node.frames['b']._fusion) <= 2
 
 
 def test_infos_are_not_needed_with_every_image(bench):

@@ -7,9 +7,10 @@ import shutil
 import struct
 
 from hooc_perception.core.depth_encodings import decode_depth
+from hooc_perception.diagnosis.bag import check_bag
 from hooc_perception.errors import HoocError
 from hooc_perception.replay import mcap_file
-from hooc_perception.replay.bag_files import iter_messages, topics
+from hooc_perception.replay.bag_files import iter_messages, topics, TYPES
 from hooc_perception.replay.bag_reader import BagScene
 from hooc_perception.replay.raw_writer import RawBagWriter
 from hooc_perception.replay.salvage import salvaged, write_salvaged
@@ -19,6 +20,8 @@ from mcap.writer import CompressionType, Writer
 import numpy as np
 import pytest
 import zstandard
+
+IMAGE = 'sensor_msgs/msg/Image'
 
 
 @pytest.fixture(scope='module')
@@ -142,7 +145,6 @@ def test_databases_are_salvaged_row_by_row(tmp_path, demo):
     found = salvaged(bag)
     assert found.notes and len(found.messages) > len(contents(demo))
     (message, *_) = [m for m in found.messages if m[0].endswith('image_raw')]
-    from hooc_perception.replay.bag_files import TYPES
     image = TYPES.deserialize_cdr(message[2], message[1])
     assert np.isfinite(decode_depth(image.data, image.height, image.width, image.encoding,
                                     image.step)).any()
@@ -200,6 +202,40 @@ def test_a_chunk_that_would_fill_the_memory_is_refused(tmp_path, kind):
     with pytest.raises(HoocError, match='no bag of a recorder'):
         topics(path)
     assert salvaged(path).messages == []
+
+
+def test_messages_that_would_fill_the_memory_are_left_and_a_check_keeps_none(
+        tmp_path, monkeypatch):
+    limit = 1 << 20
+    monkeypatch.setattr(mcap_file, 'MOST_SALVAGED', limit)
+    size = 100_000
+    kinds = TYPES.types
+    head = kinds['std_msgs/msg/Header'](kinds['builtin_interfaces/msg/Time'](1, 0), 'x')
+    data = bytes(TYPES.serialize_cdr(
+        kinds[IMAGE](head, 1, size, 'mono8', 0, size, np.zeros(size, np.uint8)), IMAGE))
+    path = tmp_path / 'bomb.mcap'
+    with open(path, 'wb') as file:
+        writer = Writer(file, compression=CompressionType.ZSTD, chunk_size=size)
+        writer.start('ros2')
+        channel = writer.register_channel('/a/depth/image_raw', 'cdr', writer.register_schema(
+            IMAGE, 'ros2msg', b''))
+        for i in range(100):
+            writer.add_message(channel, i, data, i)
+        writer.finish()
+    path.write_bytes(path.read_bytes()[:-60])
+    assert path.stat().st_size < limit / 8
+    kept, counted = salvaged(path), salvaged(path, keep=False)
+    assert sum(len(m[2]) for m in kept.messages) <= limit and len(kept.messages) == 10
+    assert counted.messages == [] and counted.counts == {IMAGE: 10}
+    assert any('the rest is left' in note for note in kept.notes)
+    text = '\n'.join(f.text for f in check_bag(path))
+    assert 'the rest is left' in text and '10 of them images' in text
+
+
+def test_notes_are_bounded(demo, tmp_path):
+    path = tmp_path / 'notes.mcap'
+    path.write_bytes(mcap_file.MAGIC + struct.pack('<BQ', 5, 0) * 5000)
+    assert 0 < len(salvaged(path).notes) <= mcap_file.MOST_NOTES
 
 
 def test_files_and_messages_that_are_compressed_whole_are_refused(demo, tmp_path):

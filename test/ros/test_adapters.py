@@ -15,7 +15,6 @@ import pytest
 pytest.importorskip('rclpy')
 
 from hooc_perception.core.types import Candidates, Energy, ParsedScene  # noqa: E402
-from hooc_perception.ros import conversions as c  # noqa: E402
 from hooc_perception.ros.adapters.choose import AdapterConfig, adapters_of  # noqa: E402
 from hooc_perception.ros.adapters.detections import covariance  # noqa: E402
 from hooc_perception.ros.adapters.guard import messages_of  # noqa: E402
@@ -251,29 +250,3 @@ def test_real_packages_have_the_fields_of_the_stubs(stubs):
         assert list(real.get_fields_and_field_types()) == list(stub.__slots__)
     if len(missing) == len(stubs.DEFINITIONS):
         pytest.skip('none of the packages is installed')
-
-
-def test_camera_poses_come_from_tf(monkeypatch):
-    """Extrinsics in: what the listener of tf2 knows, nothing where it does not."""
-    from hooc_perception.ros import camera_input
-
-    class LookupError2(Exception):
-        pass
-
-    class Buffer:
-        def lookup_transform(self, target, source, time):
-            if source != 'cam_optical':
-                raise LookupError2(source)
-            return c.transform_message((1, 2, 3), (0, 0, 0, 1), c.header(0, target), source)
-
-    made = []
-    monkeypatch.setattr(camera_input, 'Buffer', Buffer)
-    monkeypatch.setattr(camera_input, 'Time', lambda: None, raising=False)
-    monkeypatch.setattr(camera_input, 'TransformException', LookupError2, raising=False)
-    monkeypatch.setattr(camera_input, 'TransformListener', lambda *a: made.append(a),
-                        raising=False)
-    tf = camera_input.TfPoses('the node')
-    assert made[0][1] == 'the node'
-    found = tf.lookup('table', 'cam_optical')
-    assert xyz(found.transform.translation) == (1, 2, 3) and found.header.frame_id == 'table'
-    assert tf.lookup('table', 'other') is None and tf.lookup('table', '') is None

@@ -3,6 +3,7 @@
 """Recorded images are paced like live ones."""
 
 from hooc_perception.ros.player import Player, PlayerConfig
+import pytest
 
 MS = 1_000_000
 RECORDED = [(camera, 5_000 * MS + i * 100 * MS, f'{camera}{i}')
@@ -50,6 +51,25 @@ def test_loop_starts_again_with_later_stamps():
     assert len(out) > 12
     stamps = [d.stamp_ns for _, d in out if d.camera == 'a']
     assert all(x < y for x, y in zip(stamps, stamps[1:]))
+
+
+@pytest.mark.parametrize('rate', [0.1, 1.0, 2.0])
+def test_one_set_is_looped_once_a_second(rate):
+    out = play(Player(lambda: iter(RECORDED[:2]), PlayerConfig(loop=True, rate=rate)),
+               until_ms=round(3500 / rate))
+    assert [t for t, d in out if d.camera == 'a'] == [round(i * 1000 / rate) for i in range(4)]
+    assert len(out) == 8
+
+
+def test_there_is_one_period_between_two_passes():
+    out = play(Player(lambda: iter(RECORDED), PlayerConfig(loop=True)), until_ms=900)
+    assert [t for t, d in out if d.camera == 'a'] == [i * 100 for i in range(9)]
+
+
+def test_rate_zero_waits_for_no_seam():
+    out = play(Player(lambda: iter(RECORDED), PlayerConfig(rate=0.0, loop=True)),
+               answer_after_ms=10, until_ms=200)
+    assert len(out) > 18
 
 
 def test_rate_zero_waits_for_answers():

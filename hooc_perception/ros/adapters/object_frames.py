@@ -20,7 +20,12 @@ class ObjectFrames:
             self._publisher.publish(frames_message(scene, self._messages))
 
     def clear(self, stamp_ns, frame):
-        """Do nothing: tf2 forgets by itself what is not sent any more."""
+        """
+        Do nothing: tf2 has no way to take a frame back.
+
+        The frame of an object that is gone stays to be found at its last stamp, also by who
+        asks for the latest; look it up at the stamp of an answer instead.
+        """
 
 
 def frames_message(scene, messages):

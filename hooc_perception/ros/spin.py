@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run one node in one process: single-threaded, ends quietly on signals and orphanhood."""
 
+from contextlib import suppress
 import ctypes
 import os
 import signal
@@ -12,6 +13,7 @@ import time
 from hooc_perception.errors import HoocError
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 
 PARENT_VARIABLE = 'HOOC_SUPERVISOR_PID'
 _PR_SET_PDEATHSIG = 1
@@ -23,7 +25,30 @@ def run_node(make_node, args=None):
 
     :param args: the ROS arguments, None = those of the process.
     """
-    end_with_parent()
+    try:
+        with suppress(ValueError):      # not in the main thread: signals are not ours
+            interrupt = _Interrupt()
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, interrupt)
+        end_with_parent()
+        return _run(make_node, args)
+    except KeyboardInterrupt:
+        return 0
+
+
+class _Interrupt:
+    """Raise KeyboardInterrupt for the first signal; those that follow let the end be orderly."""
+
+    def __init__(self):
+        self._heard = False
+
+    def __call__(self, number, frame):
+        if not self._heard:
+            self._heard = True
+            raise KeyboardInterrupt
+
+
+def _run(make_node, args):
     rclpy.init(args=args)
     node = None
     try:
@@ -33,6 +58,10 @@ def run_node(make_node, args=None):
         executor.spin()
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except rclpy_implementation.RCLError:
+        # A signal ends the context at any moment, also between two calls that need it.
+        if rclpy.ok():
+            raise
     except HoocError as error:
         print(f'[ERROR] {error}', file=sys.stderr, flush=True)
         return 1

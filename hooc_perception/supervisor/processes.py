@@ -13,7 +13,7 @@ import time
 
 from hooc_perception.supervisor.environment import child_environment
 
-_QUIET = ('[INFO]', '[DEBUG]')
+_QUIET, _LOUD = ('[INFO]', '[DEBUG]'), ('[WARN]', '[ERROR]', '[FATAL]')
 
 
 class NodeProcess:
@@ -34,7 +34,8 @@ class NodeProcess:
         :param module: another module to run, in tests.
         """
         self.name, self._verbose = name, verbose
-        self._lines = deque(maxlen=40)
+        self._lines, self._stopping = deque(maxlen=40), False
+        node = f'{namespace.rstrip("/")}/{name}'
         # A group of its own: Ctrl-C reaches the supervisor only, which ends the nodes in order.
         self._process = subprocess.Popen(
             [sys.executable, '-m', module or f'hooc_perception.nodes.{name}', '--ros-args',
@@ -65,8 +66,13 @@ class NodeProcess:
         return re.sub(r'^\[(ERROR|FATAL)\] ', '', (errors or lines or ['it said nothing'])[-1])
 
     def ask_to_stop(self):
-        """Send SIGINT, which rclpy turns into an orderly end."""
-        self._signal(signal.SIGINT)
+        """
+        Send SIGTERM, which `run_node` turns into an orderly end.
+
+        Not SIGINT: a process that is still importing would print a trace.
+        """
+        self._stopping = True
+        self._signal(signal.SIGTERM)
 
     def kill(self):
         """End it at once; the keeper notices."""
@@ -93,7 +99,9 @@ class NodeProcess:
         for line in self._process.stdout:
             line = line.rstrip()
             self._lines.append(line)
-            if line and (self._verbose or not line.startswith(_QUIET)):
+            # What it does not log at its end is what libraries say of what is gone already.
+            quiet = not line.startswith(_LOUD) if self._stopping else line.startswith(_QUIET)
+            if line and (self._verbose or not quiet):
                 print(f'[{self.name}] {line}', file=sys.stderr, flush=True)
         self._process.stdout.close()
 

@@ -48,8 +48,8 @@ def run(args):
                         params_file=args.params) as supervisor:
             supervisor.bring_up()
             up = True
-            print(f'the nodes are up; objects come on {args.namespace.rstrip("/")}/objects/poses; '
-                  'end with Ctrl-C', flush=True)
+            topic = supervisor.node.resolve_topic_name('objects/poses')
+            print(f'the nodes are up; objects come on {topic}; end with Ctrl-C', flush=True)
             keeper = Keeper(supervisor)
             while True:
                 keeper.spin(0.2)

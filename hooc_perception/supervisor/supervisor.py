@@ -9,7 +9,7 @@ import time
 
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.parameters import parameter_message
-from hooc_perception.supervisor.environment import isolate, use_large_segments
+from hooc_perception.supervisor.environment import full_namespace, isolate, use_large_segments
 from hooc_perception.supervisor.params_file import unreached_sections
 from hooc_perception.supervisor.processes import NodeProcess
 from hooc_perception.supervisor.shared_memory import free_orphans
@@ -50,10 +50,11 @@ class Supervisor:
 
         :param parameters: {node name: {parameter: value}}.
         :param isolated: keep apart from all other ROS traffic.
+        :param namespace: of the nodes; HoocError where ROS takes no such one.
         :param params_file: YAML of the user; `parameters` win over it.
         :param modules: {node name: module}, in tests.
         """
-        self.names, self.namespace = tuple(names), namespace
+        self.names, self.namespace = tuple(names), full_namespace(namespace)
         self._parameters = {name: dict(values) for name, values in (parameters or {}).items()}
         self._isolated, self._verbose, self._modules = isolated, verbose, modules or {}
         self._params_file = Path(params_file) if params_file else None
@@ -66,8 +67,11 @@ class Supervisor:
         """Start the processes and wait until all of them can be talked to."""
         self._old_handlers = {}
         try:
-            for number in (signal.SIGTERM, signal.SIGHUP):
-                self._old_handlers[number] = signal.signal(number, _exit_by_signal)
+            # A shell without job control starts what is in the background with SIGINT ignored.
+            for number, handler in ((signal.SIGINT, signal.default_int_handler),
+                                    (signal.SIGTERM, _exit_by_signal),
+                                    (signal.SIGHUP, _exit_by_signal)):
+                self._old_handlers[number] = signal.signal(number, handler)
         except ValueError:
             pass    # not in the main thread: whoever is there handles signals
         try:

@@ -3,7 +3,6 @@
 """A node as a process: start it, pass on what it says, notice its end, end it."""
 
 from collections import deque
-import json
 import re
 import signal
 import subprocess
@@ -12,6 +11,7 @@ import threading
 import time
 
 from hooc_perception.supervisor.environment import child_environment
+from hooc_perception.supervisor.params_file import open_last_file
 
 _QUIET, _LOUD = ('[INFO]', '[DEBUG]'), ('[WARN]', '[ERROR]', '[FATAL]')
 
@@ -24,7 +24,7 @@ class NodeProcess:
     """
 
     def __init__(self, name, parameters, namespace, params_file=None,
-                 verbose=False, module=None):
+                 verbose=False, module=None, defaults=None):
         """
         Start the process.
 
@@ -32,20 +32,24 @@ class NodeProcess:
         :param params_file: YAML of the user; `parameters` win over it.
         :param verbose: pass on everything; else only warnings and errors.
         :param module: another module to run, in tests.
+        :param defaults: {name: value} that hold where neither the file nor `parameters` say
+            otherwise.
         """
         self.name, self._verbose = name, verbose
         self._lines, self._stopping = deque(maxlen=40), False
         node = f'{namespace.rstrip("/")}/{name}'
         # A group of its own: Ctrl-C reaches the supervisor only, which ends the nodes in order.
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', module or f'hooc_perception.nodes.{name}', '--ros-args',
-             '-r', f'__ns:={namespace}',
-             # What they say comes through the pipe; no files in the home directory as well.
-             '--disable-external-lib-logs',
-             *(['--params-file', str(params_file)] if params_file else []),
-             *(word for item in parameters.items() for word in _assignment(*item))],
-            env=child_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True, errors='replace', start_new_session=True)
+        with open_last_file(parameters, node, params_file, defaults) as last:
+            paths = [*([params_file] if params_file else []), f'/dev/fd/{last.fileno()}']
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', module or f'hooc_perception.nodes.{name}', '--ros-args',
+                 '-r', f'__ns:={namespace}',
+                 # What they say comes through the pipe; no files in the home directory as well.
+                 '--disable-external-lib-logs',
+                 *(word for path in paths for word in ('--params-file', str(path)))],
+                env=child_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT, text=True, errors='replace', start_new_session=True,
+                pass_fds=[last.fileno()])
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -104,10 +108,3 @@ class NodeProcess:
             if line and (self._verbose or not quiet):
                 print(f'[{self.name}] {line}', file=sys.stderr, flush=True)
         self._process.stdout.close()
-
-
-def _assignment(name, value):
-    """Return the arguments that set a parameter: JSON is YAML, so nothing needs a file."""
-    if value is None or value in ((), []):
-        return []
-    return ['-p', f'{name}:={json.dumps(value)}']

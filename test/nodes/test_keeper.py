@@ -47,7 +47,8 @@ def statuses(node):
 
 
 def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment):
-    with Supervisor((*CHAIN, REPLAY), cheap_chain(repository, cheap), isolated=True) as supervisor:
+    with Supervisor((*CHAIN, REPLAY), cheap_chain(repository, cheap), isolated=True,
+                    params_file=repository / 'config' / 'perception.yaml') as supervisor:
         supervisor.bring_up()
         keeper = Keeper(supervisor, pause_s=0.1)
         heard, latest = [], statuses(supervisor.node)
@@ -74,7 +75,9 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
             assert until(lambda: said(name)), latest
             assert until(lambda: not keeper.reviving() and heard[-1].poses), f'no {name}'
         assert keeper.deaths == dict.fromkeys(CHAIN, 1)
-        assert supervisor._parameters['ingestion_node']['max_set_spread_s'] == 0.25
+        # The file that the node was started with again says 0.1.
+        assert supervisor.get_parameters('ingestion_node', ['max_set_spread_s']) == {
+            'max_set_spread_s': 0.25}
         assert until(lambda: 'hooc_supervisor: parsing_node' in latest)
 
 

@@ -11,6 +11,7 @@ import time
 
 from hooc_perception.errors import HoocError
 import pytest
+import yaml
 
 pytest.importorskip('rclpy')
 
@@ -116,9 +117,10 @@ def test_lost_answers_are_asked_for_again(monkeypatch, tmp_path):
         supervisor._clients = forgetful
         assert supervisor.state('replay_node') == 1
         supervisor.set_parameters('replay_node', {'rate': 2.0})
+        assert supervisor.get_parameters('replay_node', ['rate']) == {'rate': 2.0}
         with pytest.raises(HoocError, match='parameter bag is empty'):
             supervisor.bring_up()
-        assert [c.calls >= 2 for c in forgetful.values()] == [True] * 3
+        assert [c.calls >= 2 for c in forgetful.values()] == [True] * 4
 
 
 def test_a_broken_parameter_file_ends_in_a_sentence(tmp_path):
@@ -137,8 +139,6 @@ def test_the_shipped_parameter_file_is_accepted(repository):
         pass
 
 
-def test_parallel_runs_get_domains_of_their_own():
-    claims = [environment.claim_domain() for _ in range(20)]
 @pytest.mark.parametrize('order', [1, -1])
 def test_what_is_asked_for_wins_over_every_section_of_the_users_file(tmp_path, order):
     """In ROS, the section that is first named last wins, even over -p."""
@@ -178,6 +178,8 @@ def test_a_namespace_that_ros_refuses_is_named_before_anything_starts(namespace,
         Supervisor(namespace=namespace)
 
 
+def test_parallel_runs_get_domains_of_their_own():
+    claims = [environment.claim_domain() for _ in range(20)]
     assert len({domain for domain, _ in claims}) == 20
     for _, claim in claims:
         claim.close()

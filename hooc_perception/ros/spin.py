@@ -36,6 +36,12 @@ def run_node(make_node, args=None):
         return 0
 
 
+def raise_interrupt(error):
+    """Raise the KeyboardInterrupt that compiled code has turned into another error, if it has."""
+    if isinstance(error.__cause__, KeyboardInterrupt):
+        raise error.__cause__
+
+
 class _Interrupt:
     """Raise KeyboardInterrupt for the first signal; those that follow let the end be orderly."""
 

@@ -18,6 +18,7 @@ from hooc_perception.ros.diagnostics import Diagnostics
 from hooc_perception.ros.misaddressed import misaddressed
 from hooc_perception.ros.parameters import Parameters
 from hooc_perception.ros.qos import overridable, qos
+from hooc_perception.ros.spin import raise_interrupt
 from rclpy.clock import Clock, ClockType
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
@@ -140,6 +141,7 @@ class StageNode(LifecycleNode):
             try:
                 callback(message)
             except Exception as error:
+                raise_interrupt(error)
                 self.diagnostics.error('input', 'unexpected', (
                     f'unexpected {type(error).__name__}: {error}; the message is dropped; please '
                     'report this with the traceback'))
@@ -217,6 +219,7 @@ class StageNode(LifecycleNode):
         except HoocError as error:
             self.diagnostics.failed(f'{what}_failed', str(error))
         except Exception as error:
+            raise_interrupt(error)
             # rclpy would swallow it, and the transition would fail without a word.
             self.diagnostics.failed(f'{what}_failed',
                                     f'unexpected {type(error).__name__}: {error}')

@@ -104,7 +104,8 @@ class NodeProcess:
             line = line.rstrip()
             self._lines.append(line)
             # What it does not log at its end is what libraries say of what is gone already.
-            quiet = not line.startswith(_LOUD) if self._stopping else line.startswith(_QUIET)
-            if line and (self._verbose or not quiet):
+            if self._stopping and not line.startswith((*_QUIET, *_LOUD)):
+                continue
+            if line and (self._verbose or not line.startswith(_QUIET)):
                 print(f'[{self.name}] {line}', file=sys.stderr, flush=True)
         self._process.stdout.close()

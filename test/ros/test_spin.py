@@ -11,6 +11,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from hooc_perception.ros.spin import raise_interrupt  # noqa: E402
 from hooc_perception.supervisor.processes import NodeProcess  # noqa: E402
 
 HEAD = """
@@ -71,6 +72,15 @@ def test_signals_end_a_node_quietly_also_when_repeated(number):
     process.send_signal(number)
     _, said = process.communicate(timeout=30)
     assert (process.returncode, said) == (0, '')
+
+
+def test_an_interrupt_of_compiled_code_is_one():
+    """As CPython words it where a signal comes while a kernel of numba runs."""
+    error = SystemError('returned a result with an exception set')
+    error.__cause__ = KeyboardInterrupt()
+    with pytest.raises(KeyboardInterrupt):
+        raise_interrupt(error)
+    raise_interrupt(ValueError('something else'))
 
 
 def stopped(tmp_path, monkeypatch, code):

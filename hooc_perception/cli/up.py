@@ -46,11 +46,11 @@ def run(args):
         with Supervisor(CHAIN, parameters, args.namespace, verbose=not args.quiet,
                         params_file=args.params,
                         defaults=model_defaults(model)) as supervisor:
+            keeper = Keeper(supervisor)
             supervisor.bring_up()
             up = True
             topic = supervisor.node.resolve_topic_name('objects/poses')
             print(f'the nodes are up; objects come on {topic}; end with Ctrl-C', flush=True)
-            keeper = Keeper(supervisor)
             while True:
                 keeper.spin(0.2)
     except KeyboardInterrupt:

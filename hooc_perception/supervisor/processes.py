@@ -62,6 +62,17 @@ class NodeProcess:
         """Return the exit code, None while it runs."""
         return self._process.poll()
 
+    def manner_of_death(self):
+        """Return in words how a process that has ended did so."""
+        code = self.exit_code()
+        if code >= 0:
+            return f'exit code {code}'
+        try:
+            name = signal.Signals(-code).name
+        except ValueError:
+            name = f'signal {-code}'
+        return f'killed by {name}' + ('; was memory short?' if -code == signal.SIGKILL else '')
+
     def last_words(self):
         """Return the last error that it printed, or its last line."""
         self._reader.join(0.5 if self.exit_code() is not None else 0)

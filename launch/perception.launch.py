@@ -46,16 +46,21 @@ def lifecycle_node(name, namespace, parameters, autostart):
     return [activate, configure, node]
 
 
+def _truth(text):
+    """Return the truth value of an argument."""
+    return text.lower() in ('true', '1', 'yes', 'on')
+
+
 def chain(context):
     """Return the actions of the four nodes; only now are the arguments known as text."""
     given = {name: LaunchConfiguration(name).perform(context) for name in (
         'model', 'profile', 'cameras', 'target_frame', 'seed', 'use_sim_time', 'params_file')}
-    own = {'model': os.path.abspath(os.path.expanduser(given['model'])),
-           'profile': given['profile'], 'target_frame': given['target_frame'],
-           'seed': int(given['seed']), 'use_sim_time': given['use_sim_time'].lower() == 'true'}
-    cameras = yaml.safe_load(given['cameras'])
-    if cameras:
-        own['cameras'] = cameras
+    own = {'model': os.path.abspath(os.path.expanduser(given['model']))}
+    # What is not given is up to the file, which stands before.
+    for name, kind in (('profile', str), ('target_frame', str), ('seed', int),
+                       ('use_sim_time', _truth), ('cameras', yaml.safe_load)):
+        if given[name] and (value := kind(given[name])) != []:
+            own[name] = value
     actions = []
     for name in CHAIN:
         actions += lifecycle_node(name, LaunchConfiguration('namespace'),
@@ -70,17 +75,22 @@ def generate_launch_description():
     return LaunchDescription([
         DeclareLaunchArgument('model', description='folder that hooc train wrote'),
         DeclareLaunchArgument('profile', default_value='',
-                              description="paper, best or fast; empty takes the model's"),
-        DeclareLaunchArgument('cameras', default_value='[]',
-                              description="names as a list; empty takes the model's"),
-        DeclareLaunchArgument('target_frame', default_value='table'),
-        DeclareLaunchArgument('seed', default_value='0'),
+                              description='paper, best or fast; empty: see params_file'),
+        DeclareLaunchArgument('cameras', default_value='',
+                              description='names as a list; empty: see params_file'),
+        DeclareLaunchArgument('target_frame', default_value='',
+                              description='empty: see params_file'),
+        DeclareLaunchArgument('seed', default_value='', description='empty: see params_file'),
         DeclareLaunchArgument('namespace', default_value='hooc'),
-        DeclareLaunchArgument('use_sim_time', default_value='false'),
+        DeclareLaunchArgument('use_sim_time', default_value='',
+                              description='true or false; empty: see params_file'),
         DeclareLaunchArgument('autostart', default_value='true',
                               description='configure and activate the nodes'),
         DeclareLaunchArgument('respawn', default_value='true',
                               description='start a node again that has died'),
-        DeclareLaunchArgument('params_file', default_value=params),
+        DeclareLaunchArgument(
+            'params_file', default_value=params,
+            description='parameters of the nodes; what neither it nor an argument says is '
+                        "the model's or the nodes' default"),
         OpaqueFunction(function=chain),
     ])

@@ -6,6 +6,8 @@ from pathlib import Path
 
 from hooc_perception.errors import HoocError
 
+# Where the ranges of the nodes' parameters `seed` and `wait_for_answer_s` end.
+LAST_SEED, LONGEST_WAIT_S = 2 ** 31 - 1, 600.0
 HELP = ('Parse recorded bags through the five nodes as separate processes, fed by the replay '
         'node. The same objects as `hooc parse` finds, with the time that the nodes took.')
 
@@ -48,10 +50,7 @@ def run(args):
         if names.count(bag.name) > 1:
             raise HoocError(f'two bags hold the scene {bag.name!r}; run them one at a time')
         bag.views()     # a bag that cannot be used is better refused before anything starts
-    profile = args.profile or model.profile
-    seed = model.seed if args.seed is None else args.seed
-    parameters = chain_parameters(args, profile, seed)
-    answers = play(bags, args, parameters)
+    answers, profile, seed = play(bags, args, model)
     classes = [m.name for m in model.models]
     entries = [scene_result(bag.name, answer.parsed, classes, answer.seconds, **bag.world)
                for bag, answer in zip(bags, answers)]
@@ -72,21 +71,25 @@ def bag_paths(given):
     return paths
 
 
-def chain_parameters(args, profile, seed):
+def chain_parameters(args, model):
     """
-    Return {node: parameters} of the chain for model, profile, seed and --set-parameter.
+    Return {node: parameters} of the chain for what was given of profile, seed, --set-parameter.
+
+    What was not given is up to the user's file and then to the model: see `model_defaults`.
 
     :raises HoocError: where a parameter is unknown, or its value is refused.
     """
     from hooc_perception.cli.overrides import overrides_of
     from hooc_perception.core import profiles
     from hooc_perception.supervisor.supervisor import CHAIN
-    if seed < 0:
-        raise HoocError(f'--seed is {seed}; it must not be negative')
-    common = {'model': str(args.model.resolve()), 'profile': profile, 'seed': seed}
-    parameters = {name: dict(common) for name in CHAIN}
+    seed = model.seed if args.seed is None else args.seed
+    if not 0 <= seed <= LAST_SEED:
+        raise HoocError(f'the seed is {seed}; give --seed a number from 0 to {LAST_SEED}')
+    common = {'model': str(args.model.resolve()), 'profile': args.profile, 'seed': args.seed}
+    parameters = {name: {key: value for key, value in common.items() if value is not None}
+                  for name in CHAIN}
     overrides = overrides_of(getattr(args, 'set_parameter', ()))
-    changed = profiles.with_overrides(profiles.profile(profile), overrides)
+    changed = profiles.with_overrides(profiles.profile(args.profile or model.profile), overrides)
     of_stage = {'observe': CHAIN, 'classify': CHAIN[1:2], 'propose': CHAIN[2:3],
                 'parse': CHAIN[3:]}
     for key in overrides:
@@ -97,23 +100,32 @@ def chain_parameters(args, profile, seed):
     return parameters
 
 
-def play(bags, args, parameters):
-    """Return the Answer of every bag."""
+def model_defaults(model):
+    """Return {node: parameters} of the chain that hold where nobody says otherwise."""
+    from hooc_perception.supervisor.supervisor import CHAIN
+    return {name: {'profile': model.profile, 'seed': model.seed} for name in CHAIN}
+
+
+def play(bags, args, model):
+    """Return ([Answer of every bag], profile, seed); the last two as the nodes have them."""
     from hooc_perception.supervisor.bags import BagRunner, LISTENERS, MATCH_TIMEOUT_S
     from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
     from tqdm import tqdm
+    parameters = chain_parameters(args, model)
     # A recorded frame set is complete however long it waits.
-    parameters['ingestion_node'].update(max_frame_age_s=0.0, wait_for_answer_s=args.timeout)
+    parameters['ingestion_node'].update(max_frame_age_s=0.0,
+                                        wait_for_answer_s=min(args.timeout, LONGEST_WAIT_S))
     # Each bag is a scene of its own, whatever stood there in the last one.
     parameters['parsing_node'].update(track_ttl_s=0.0)
     parameters[REPLAY] = {'wait_for_subscribers': LISTENERS, 'match_timeout_s': MATCH_TIMEOUT_S}
     answers = []
     with Supervisor((*CHAIN, REPLAY), parameters, isolated=True, verbose=args.verbose,
-                    params_file=args.params) as supervisor:
+                    params_file=args.params, defaults=model_defaults(model)) as supervisor:
         runner = BagRunner(supervisor, args.timeout, getattr(args, 'record', None))
         for bag in tqdm(bags, desc='scenes', unit='scene', disable=None):
             answers.append(runner.play(bag))
-    return answers
+        used = supervisor.get_parameters(CHAIN[-1], ('profile', 'seed'))
+    return answers, used['profile'], used['seed']
 
 
 def write_report(folder, bags, answers, entries, model, profile, seed):

@@ -29,13 +29,12 @@ def add_arguments(parser):
 
 def run(args):
     """Run the command until it is interrupted."""
-    from hooc_perception.cli.run import chain_parameters
+    from hooc_perception.cli.run import chain_parameters, model_defaults
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.supervisor.keeper import Keeper
     from hooc_perception.supervisor.supervisor import CHAIN, Supervisor
     model = load_model_folder(args.model)
-    parameters = chain_parameters(args, args.profile or model.profile,
-                                  model.seed if args.seed is None else args.seed)
+    parameters = chain_parameters(args, model)
     if args.cameras:
         poses = camera_poses(args.cameras)
         for name in CHAIN:
@@ -45,12 +44,13 @@ def run(args):
     up = False
     try:
         with Supervisor(CHAIN, parameters, args.namespace, verbose=not args.quiet,
-                        params_file=args.params) as supervisor:
+                        params_file=args.params,
+                        defaults=model_defaults(model)) as supervisor:
+            keeper = Keeper(supervisor)
             supervisor.bring_up()
             up = True
-            print(f'the nodes are up; objects come on {args.namespace.rstrip("/")}/objects/poses; '
-                  'end with Ctrl-C', flush=True)
-            keeper = Keeper(supervisor)
+            topic = supervisor.node.resolve_topic_name('objects/poses')
+            print(f'the nodes are up; objects come on {topic}; end with Ctrl-C', flush=True)
             while True:
                 keeper.spin(0.2)
     except KeyboardInterrupt:

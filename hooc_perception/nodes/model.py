@@ -4,6 +4,7 @@
 
 from hooc_perception.errors import HoocError
 from hooc_perception.models.folder import load_model_folder
+from hooc_perception.ros.found import topic_token
 
 
 def model_of(node):
@@ -28,4 +29,11 @@ def camera_names(node, model=None):
         raise HoocError('parameter cameras is empty and the model names none; set cameras')
     if len(set(names)) != len(names):
         raise HoocError(f'parameter cameras names one twice: {", ".join(names)}')
+    for name in names:
+        # A name may have several tokens, as left/wrist.
+        fits = '/'.join(map(topic_token, name.split('/')))
+        if name != fits or not all(name.split('/')):
+            raise HoocError(f'parameter cameras names {name!r}, but topics are named after it: '
+                            'use letters, digits and _, and no digit first'
+                            + (f', such as {fits}' if all(fits.split('/')) else ''))
     return names

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run one node in one process: single-threaded, ends quietly on signals and orphanhood."""
 
+from contextlib import suppress
 import ctypes
 import os
 import signal
@@ -12,11 +13,11 @@ import time
 from hooc_perception.errors import HoocError
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 
 PARENT_VARIABLE = 'HOOC_SUPERVISOR_PID'
 HEED_S = 0.2    # Python heeds a signal when it is through with waiting
-_ENDS = signal.SIGINT, signal.SIGTERM
 _PR_SET_PDEATHSIG = 1
 
 
@@ -28,10 +29,37 @@ def run_node(make_node, args=None):
 
     :param args: the ROS arguments, None = those of the process.
     """
-    end_with_parent()
+    try:
+        with suppress(ValueError):      # not in the main thread: signals are not ours
+            interrupt = _Interrupt()
+            for number in (signal.SIGINT, signal.SIGTERM):
+                signal.signal(number, interrupt)
+        end_with_parent()
+        return _run(make_node, args)
+    except KeyboardInterrupt:
+        return 0
+
+
+def raise_interrupt(error):
+    """Raise the KeyboardInterrupt that compiled code has turned into another error, if it has."""
+    if isinstance(error.__cause__, KeyboardInterrupt):
+        raise error.__cause__
+
+
+class _Interrupt:
+    """Raise KeyboardInterrupt for the first signal; those that follow let the end be orderly."""
+
+    def __init__(self):
+        self._heard = False
+
+    def __call__(self, number, frame):
+        if not self._heard:
+            self._heard = True
+            raise KeyboardInterrupt
+
+
+def _run(make_node, args):
     # rclpy's own handlers would end the context first, in which nobody can say good-bye.
-    for number in _ENDS:
-        signal.signal(number, signal.default_int_handler)
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
@@ -42,12 +70,14 @@ def run_node(make_node, args=None):
             executor.spin_once(timeout_sec=HEED_S)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
+    except rclpy_implementation.RCLError:
+        # Others may end the context at any moment, also between two calls that need it.
+        if rclpy.ok():
+            raise
     except HoocError as error:
         print(f'[ERROR] {error}', file=sys.stderr, flush=True)
         return 1
     finally:
-        for number in _ENDS:
-            signal.signal(number, signal.SIG_IGN)   # it ends already
         if node is not None:
             if rclpy.ok():
                 node.leave()

@@ -16,6 +16,7 @@ from hooc_perception.ros.memory import give_back_memory
 from hooc_perception.ros.misaddressed import misaddressed
 from hooc_perception.ros.parameters import fixed_param, Parameters
 from hooc_perception.ros.qos import overridable, qos
+from hooc_perception.ros.spin import raise_interrupt
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -138,6 +139,7 @@ class StageNode(LifecycleNode):
                 callback(*args)
                 return True
             except Exception as error:
+                raise_interrupt(error)
                 self.diagnostics.error(thing, 'unexpected', (
                     f'unexpected {type(error).__name__}: {error}; {loss}; please report this '
                     'with the traceback'))
@@ -236,6 +238,7 @@ class StageNode(LifecycleNode):
         except HoocError as error:
             self.diagnostics.failed(f'{what}_failed', str(error))
         except Exception as error:
+            raise_interrupt(error)
             # rclpy would swallow it, and the transition would fail without a word.
             self.diagnostics.failed(f'{what}_failed',
                                     f'unexpected {type(error).__name__}: {error}')

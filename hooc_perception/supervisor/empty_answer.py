@@ -2,34 +2,53 @@
 # SPDX-License-Identifier: Apache-2.0
 """Take back what a dead chain has said: nobody should reach for what nobody watches."""
 
+import json
+
 from geometry_msgs.msg import PoseArray
-from hooc_perception.ros.conversions import header
+from hooc_perception.core.types import Candidates, Energy, ParsedScene
+from hooc_perception.ros.adapters.detections import detections_message
+from hooc_perception.ros.found import FoundScene
+from hooc_perception.ros.object_output import summary_json
 from hooc_perception.ros.point_clouds import cloud_message, row_dtype
 from hooc_perception.ros.qos import qos
 from hooc_perception.ros.stage_messages import OBJECT_COLUMNS, points_message
+from hooc_perception.supervisor.shown import optional_messages
 import numpy as np
 from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
+
+_NONE = np.zeros(0)
+_NOTHING = ParsedScene(Candidates.empty(), Energy(0.0, 0.0, 0.0), _NONE, _NONE, _NONE, _NONE,
+                       Candidates.empty(), converged=False)
 
 
 class EmptyAnswer:
     """
     Publish empty objects in place of a parsing node that cannot do it itself.
 
-    :param node: rclpy Node in the namespace of the chain.
-    :param frame: the target frame.
+    :param node: rclpy Node in the namespace of the chain, by whose clock they are stamped.
+    :param shown: the Shown that remembers what has to be taken back one by one.
+    :param detections: whether `objects/detections` is one of the topics.
     """
 
-    def __init__(self, node, frame):
+    def __init__(self, node, shown, detections=False):
         """Create the publishers, one for each topic of the answer that anybody knows."""
-        self._node, self._frame = node, frame
+        self._node, self._shown, self._made = node, shown, []
+        self._markers = set()       # all that ever have to go: subscribers come late
+        self._detections = optional_messages('vision_msgs') if detections else None
+        self._topics = {topic: self._publisher(kind, topic) for kind, topic in (
+            (String, 'objects/labels'), (PointCloud2, 'objects/attributes'),
+            (MarkerArray, 'objects/markers'), (PointCloud2, 'scene/unexplained'),
+            (String, 'scene/summary'))}
+        if self._detections:
+            self._topics['objects/detections'] = self._publisher(
+                self._detections.Detection3DArray, 'objects/detections')
         self._poses = [self._publisher(PoseArray, topic) for topic in self._pose_topics()]
-        self._attributes = self._publisher(PointCloud2, 'objects/attributes')
-        self._markers = self._publisher(MarkerArray, 'objects/markers')
-        self._unexplained = self._publisher(PointCloud2, 'scene/unexplained')
 
     def _publisher(self, kind, topic):
-        return self._node.create_publisher(kind, topic, qos('objects/poses'))
+        self._made.append(self._node.create_publisher(kind, topic, qos('objects/poses')))
+        return self._made[-1]
 
     def _pose_topics(self):
         """Return objects/<category>/poses of all categories, then objects/poses."""
@@ -38,16 +57,33 @@ class EmptyAnswer:
                  if topic.startswith(prefix) and topic.endswith('/poses')}
         return sorted(known - {prefix + 'poses'}) + [prefix + 'poses']
 
-    def publish(self):
-        """Say that nothing is known to stand there; `objects/poses` goes last."""
-        head = header(self._node.get_clock().now().nanoseconds, self._frame)
-        self._attributes.publish(cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head))
-        self._markers.publish(MarkerArray(markers=[Marker(action=Marker.DELETEALL)]))
-        self._unexplained.publish(points_message(np.zeros((0, 3)), head))
+    def publish(self, frame):
+        """Say that nothing is known to stand in the target frame; `objects/poses` goes last."""
+        scene = FoundScene(self._node.get_clock().now().nanoseconds, frame, ())
+        head, shown = scene.header, self._shown
+        messages = {
+            'objects/attributes': cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head),
+            'objects/markers': self._markers_message(head),
+            'scene/unexplained': points_message(np.zeros((0, 3)), head),
+            'scene/summary': String(data=summary_json(_NOTHING, scene.stamp_ns))}
+        if shown.labels is not None:
+            messages['objects/labels'] = String(data=json.dumps({**shown.labels, 'objects': {}}))
+        if self._detections:
+            messages['objects/detections'] = detections_message(scene, self._detections)
+        for topic, message in messages.items():
+            self._topics[topic].publish(message)
+        shown.remove_collision_objects(head)
         for publisher in self._poses:
             publisher.publish(PoseArray(header=head))
 
+    def _markers_message(self, head):
+        """Return DELETE for all that was shown, behind DELETEALL for what nobody has seen."""
+        self._markers |= self._shown.markers
+        return MarkerArray(markers=[Marker(header=head, action=Marker.DELETEALL)] + [
+            Marker(header=head, ns=ns, id=number, action=Marker.DELETE)
+            for ns, number in sorted(self._markers)])
+
     def close(self):
         """Leave the topics to the parsing node."""
-        for publisher in (*self._poses, self._attributes, self._markers, self._unexplained):
+        for publisher in self._made:
             self._node.destroy_publisher(publisher)

@@ -11,6 +11,8 @@ import sys
 
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.spin import PARENT_VARIABLE
+from rclpy.exceptions import InvalidNamespaceException
+from rclpy.validate_namespace import validate_namespace
 
 FAST_DDS_PROFILE = Path(__file__).with_name('fast_dds.xml')
 FAST_DDS_VARIABLES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE')
@@ -19,6 +21,21 @@ SHARED_MEMORY = Path('/dev/shm')
 SEGMENT_BYTES = 64 * 2 ** 20
 # Domains above would use ports that the system gives to outgoing connections.
 DOMAINS = range(1, 102)
+
+
+def full_namespace(text):
+    """
+    Return a namespace with its slash, as the nodes have it.
+
+    :raises HoocError: where ROS takes no such namespace.
+    """
+    namespace = '/' + text.strip('/')
+    try:
+        validate_namespace(namespace)
+    except InvalidNamespaceException:
+        raise HoocError(f'the namespace {text!r} cannot be used: give letters, digits and _, no '
+                        'digit first, such as /hooc or /robot1/hooc') from None
+    return namespace
 
 
 def claim_domain():

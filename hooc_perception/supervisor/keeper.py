@@ -3,13 +3,13 @@
 """Nodes that die come back: started again, configured, activated; their answers are taken back."""
 
 from collections import Counter
-import signal
 import time
 
 from hooc_perception.ros.diagnostics import Diagnostics
 from hooc_perception.supervisor.empty_answer import EmptyAnswer
 from hooc_perception.supervisor.pulse import Pulse
 from hooc_perception.supervisor.shared_memory import free_orphans
+from hooc_perception.supervisor.shown import Shown
 from hooc_perception.supervisor.supervisor import (
     CHAIN,
     RETRY_S,
@@ -19,10 +19,13 @@ from hooc_perception.supervisor.supervisor import (
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.msg import ParameterEvent
-from rclpy.parameter import parameter_value_to_python
+from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 PARSING = 'parsing_node'
+# What the keeper has to know of the parsing node to speak in its place.
+_OF_PARSING = ('target_frame', 'use_sim_time', 'publish_detections', 'planning_scene',
+               'parse.rounds', 'more_timeout_s')
 _NEXT = {State.PRIMARY_STATE_UNCONFIGURED: Transition.TRANSITION_CONFIGURE,
          State.PRIMARY_STATE_INACTIVE: Transition.TRANSITION_ACTIVATE}
 # How often and how long the empty answer is said: subscribers need a moment to be found.
@@ -34,23 +37,25 @@ class Keeper:
     """
     Keep the nodes of a Supervisor alive; call `spin` in place of Supervisor.spin.
 
+    Make it before the nodes are brought up, while all of them answer at once.
+
     A node that dies is started again after a pause that doubles with each death and is
     forgotten after a quiet minute, with the parameters that it had, changes at run time
     included. A node that lives but does not answer any more is ended and counts as dead. Each
     death is counted and said on the log and in /diagnostics.
 
-    :param supervisor: an entered Supervisor whose nodes are up.
+    :param supervisor: an entered Supervisor.
     :param pause_s: before the first restart.
     :param longest_s: the pause never grows beyond this.
     :param quiet_s: a node that has lived so long is regarded as healthy again.
     :param hung_s: a node that has not answered for so long hangs: far longer than any frame set
-        takes. 0 = never.
+        takes. The parsing node has the time for which it may wait for candidates on top.
+        0 = never.
     """
 
-    def __init__(self, supervisor, pause_s=1.0, longest_s=30.0, quiet_s=60.0, frame='table',
-                 hung_s=120.0):
+    def __init__(self, supervisor, pause_s=1.0, longest_s=30.0, quiet_s=60.0, hung_s=120.0):
         """Watch from now on."""
-        self._supervisor, self._node, self._frame = supervisor, supervisor.node, frame
+        self._supervisor, self._node, self._hung_s = supervisor, supervisor.node, hung_s
         self._pause_s, self._longest_s, self._quiet_s = pause_s, longest_s, quiet_s
         self.diagnostics = Diagnostics(self._node)
         self.deaths = Counter()         # name -> deaths ever
@@ -59,8 +64,12 @@ class Keeper:
         self._revivals = {}             # name -> generator that brings it back
         self._pulses = {name: Pulse(supervisor, name, hung_s) for name in supervisor.names}
         self._empty, self._empty_until, self._said = None, 0.0, 0.0
+        self._shown = Shown(self._node)
+        self._parsing = {}              # parameters of the parsing node
         self._reset = self._node.create_client(Trigger, 'reset')
         self._node.create_subscription(ParameterEvent, '/parameter_events', self._on_event, 100)
+        if PARSING in supervisor.names:
+            self._adapt(supervisor.get_parameters(PARSING, _OF_PARSING))
 
     def spin(self, seconds=0.05):
         """Serve callbacks for a moment, then do what is due for those who have died."""
@@ -118,9 +127,9 @@ class Keeper:
         tell = self.diagnostics.error if self._recent[name] >= MANY_DEATHS else (
             self.diagnostics.warn)
         silent_s = self._pulses[name].silent_s
-        how = ('it ended unexpectedly' if not silent_s else
-               f'it did not answer for {silent_s:.0f} s and was ended')
-        tell(name, 'died', f'{how} ({_manner(process.exit_code(), silent_s)}last words: '
+        how = (f'it ended unexpectedly ({process.manner_of_death()}; ' if not silent_s else
+               f'it did not answer for {silent_s:.0f} s and was ended (')
+        tell(name, 'died', f'{how}last words: '
              f'{process.last_words()}); it is started again in {pause:g} s, death '
              f'{self.deaths[name]} since the start')
         self._pulses[name].start_anew()
@@ -185,11 +194,12 @@ class Keeper:
 
     def _take_back(self, name, once=False):
         """Empty the latched results: of the parsing node for others, in its place if it died."""
-        if name not in CHAIN:
+        if name not in CHAIN or PARSING not in self._supervisor.names:
             return
         if self._empty is None:
-            self._empty = EmptyAnswer(self._node, self._frame)
-        self._empty.publish()
+            self._empty = EmptyAnswer(self._node, self._shown,
+                                      self._parsing['publish_detections'])
+        self._empty.publish(self._parsing['target_frame'])
         self._said = time.monotonic()
         self._empty_until = self._said + (REPEAT_S if once else SAID_FOR_S)
         if not once and name != PARSING and self._reset.service_is_ready():
@@ -204,7 +214,7 @@ class Keeper:
             self._empty.close()
             self._empty = None
         elif now - self._said > REPEAT_S:
-            self._empty.publish()
+            self._empty.publish(self._parsing['target_frame'])
             self._said = now
 
     # What should survive.
@@ -214,8 +224,24 @@ class Keeper:
         prefix = self._supervisor.namespace.rstrip('/') + '/'
         name = event.node.removeprefix(prefix)
         if event.node.startswith(prefix) and name in self._supervisor.names:
-            self._supervisor.remember(name, {p.name: _plain(parameter_value_to_python(p.value))
-                                             for p in event.changed_parameters})
+            changed = {p.name: _plain(parameter_value_to_python(p.value))
+                       for p in event.changed_parameters}
+            self._supervisor.remember(name, changed)
+            if name == PARSING:
+                self._adapt(changed)
+
+    def _adapt(self, parameters):
+        """Do as the parsing node does: its frame, its clock, its topics, its patience."""
+        self._parsing.update((name, parameters[name]) for name in _OF_PARSING
+                             if name in parameters)
+        known = self._parsing
+        if known['use_sim_time'] != self._node.get_parameter('use_sim_time').value:
+            self._node.set_parameters([Parameter('use_sim_time', value=known['use_sim_time'])])
+        if known['planning_scene'] != 'off':
+            self._shown.watch_planning_scene()
+        if self._hung_s:
+            self._pulses[PARSING].hung_s = (
+                self._hung_s + known['parse.rounds'] * known['more_timeout_s'])
 
     def _report(self):
         for name, process in self._supervisor.processes.items():
@@ -226,17 +252,3 @@ class Keeper:
 def _plain(value):
     """Return a parameter's value without the arrays of messages."""
     return list(value) if hasattr(value, '__iter__') and not isinstance(value, str) else value
-
-
-def _manner(exit_code, silent_s):
-    """Return in words how a process ended, nothing where the keeper ended it."""
-    if silent_s:
-        return ''
-    if exit_code >= 0:
-        return f'exit code {exit_code}; '
-    try:
-        name = signal.Signals(-exit_code).name
-    except ValueError:
-        name = f'signal {-exit_code}'
-    hint = '; was memory short?' if -exit_code == signal.SIGKILL else ''
-    return f'killed by {name}{hint}; '

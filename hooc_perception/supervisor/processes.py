@@ -3,7 +3,6 @@
 """A node as a process: start it, pass on what it says, notice its end, end it."""
 
 from collections import deque
-import json
 import re
 import signal
 import subprocess
@@ -12,8 +11,9 @@ import threading
 import time
 
 from hooc_perception.supervisor.environment import child_environment
+from hooc_perception.supervisor.params_file import open_last_file
 
-_QUIET = ('[INFO]', '[DEBUG]')
+_QUIET, _LOUD = ('[INFO]', '[DEBUG]'), ('[WARN]', '[ERROR]', '[FATAL]')
 
 
 class NodeProcess:
@@ -24,7 +24,7 @@ class NodeProcess:
     """
 
     def __init__(self, name, parameters, namespace, params_file=None,
-                 verbose=False, module=None):
+                 verbose=False, module=None, defaults=None):
         """
         Start the process.
 
@@ -32,19 +32,24 @@ class NodeProcess:
         :param params_file: YAML of the user; `parameters` win over it.
         :param verbose: pass on everything; else only warnings and errors.
         :param module: another module to run, in tests.
+        :param defaults: {name: value} that hold where neither the file nor `parameters` say
+            otherwise.
         """
         self.name, self._verbose = name, verbose
-        self._lines = deque(maxlen=40)
+        self._lines, self._stopping = deque(maxlen=40), False
+        node = f'{namespace.rstrip("/")}/{name}'
         # A group of its own: Ctrl-C reaches the supervisor only, which ends the nodes in order.
-        self._process = subprocess.Popen(
-            [sys.executable, '-m', module or f'hooc_perception.nodes.{name}', '--ros-args',
-             '-r', f'__ns:={namespace}',
-             # What they say comes through the pipe; no files in the home directory as well.
-             '--disable-external-lib-logs',
-             *(['--params-file', str(params_file)] if params_file else []),
-             *(word for item in parameters.items() for word in _assignment(*item))],
-            env=child_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT, text=True, errors='replace', start_new_session=True)
+        with open_last_file(parameters, node, params_file, defaults) as last:
+            paths = [*([params_file] if params_file else []), f'/dev/fd/{last.fileno()}']
+            self._process = subprocess.Popen(
+                [sys.executable, '-m', module or f'hooc_perception.nodes.{name}', '--ros-args',
+                 '-r', f'__ns:={namespace}',
+                 # What they say comes through the pipe; no files in the home directory as well.
+                 '--disable-external-lib-logs',
+                 *(word for path in paths for word in ('--params-file', str(path)))],
+                env=child_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT, text=True, errors='replace', start_new_session=True,
+                pass_fds=[last.fileno()])
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
 
@@ -57,6 +62,17 @@ class NodeProcess:
         """Return the exit code, None while it runs."""
         return self._process.poll()
 
+    def manner_of_death(self):
+        """Return in words how a process that has ended did so."""
+        code = self.exit_code()
+        if code >= 0:
+            return f'exit code {code}'
+        try:
+            name = signal.Signals(-code).name
+        except ValueError:
+            name = f'signal {-code}'
+        return f'killed by {name}' + ('; was memory short?' if -code == signal.SIGKILL else '')
+
     def last_words(self):
         """Return the last error that it printed, or its last line."""
         self._reader.join(0.5 if self.exit_code() is not None else 0)
@@ -65,8 +81,13 @@ class NodeProcess:
         return re.sub(r'^\[(ERROR|FATAL)\] ', '', (errors or lines or ['it said nothing'])[-1])
 
     def ask_to_stop(self):
-        """Send SIGINT, which rclpy turns into an orderly end."""
-        self._signal(signal.SIGINT)
+        """
+        Send SIGTERM, which `run_node` turns into an orderly end.
+
+        Not SIGINT: a process that is still importing would print a trace.
+        """
+        self._stopping = True
+        self._signal(signal.SIGTERM)
 
     def kill(self):
         """End it at once; the keeper notices."""
@@ -93,13 +114,9 @@ class NodeProcess:
         for line in self._process.stdout:
             line = line.rstrip()
             self._lines.append(line)
+            # What it does not log at its end is what libraries say of what is gone already.
+            if self._stopping and not line.startswith((*_QUIET, *_LOUD)):
+                continue
             if line and (self._verbose or not line.startswith(_QUIET)):
                 print(f'[{self.name}] {line}', file=sys.stderr, flush=True)
         self._process.stdout.close()
-
-
-def _assignment(name, value):
-    """Return the arguments that set a parameter: JSON is YAML, so nothing needs a file."""
-    if value is None or value in ((), []):
-        return []
-    return ['-p', f'{name}:={json.dumps(value)}']

@@ -16,13 +16,13 @@ class Pulse:
 
     :param supervisor: gives the node's client.
     :param name: of the node.
-    :param hung_s: silence that counts as a hang; 0 = none does.
+    :ivar hung_s: silence that counts as a hang; 0 = none does.
     :ivar silent_s: seconds of the silence that was taken for a hang, 0.0 while there was none.
     """
 
     def __init__(self, supervisor, name, hung_s):
         """Regard the node as alive from now on."""
-        self._client, self._hung_s = supervisor.client(name, GetState), hung_s
+        self._client, self.hung_s = supervisor.client(name, GetState), hung_s
         self.start_anew()
 
     def start_anew(self):
@@ -33,17 +33,17 @@ class Pulse:
     def beats(self):
         """Ask again if it is time to; return False once, when the node turns out to hang."""
         now = time.monotonic()
-        if now - self._looked > self._hung_s / 4:
+        if now - self._looked > self.hung_s / 4:
             self.start_anew()       # nobody has listened, so no silence was heard
         self._looked = now
         if any(future.done() for future in self._futures):
             self._heard, self._futures = now, []
-        if not self._hung_s or self.silent_s:
+        if not self.hung_s or self.silent_s:
             return True
-        if now - self._heard > self._hung_s:
+        if now - self._heard > self.hung_s:
             self.silent_s = now - self._heard
             return False
-        if now - self._asked > min(ASK_EVERY_S, self._hung_s / 4):
+        if now - self._asked > min(ASK_EVERY_S, self.hung_s / 4):
             self._asked = now
             self._futures.append(self._client.call_async(GetState.Request()))
         return True

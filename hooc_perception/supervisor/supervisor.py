@@ -9,15 +9,16 @@ import time
 
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.parameters import parameter_message
-from hooc_perception.supervisor.environment import isolate, use_large_segments
+from hooc_perception.supervisor.environment import full_namespace, isolate, use_large_segments
 from hooc_perception.supervisor.params_file import unreached_sections
 from hooc_perception.supervisor.processes import NodeProcess
 from hooc_perception.supervisor.shared_memory import free_orphans
 from lifecycle_msgs.msg import State, Transition
 from lifecycle_msgs.srv import ChangeState, GetState
-from rcl_interfaces.srv import SetParametersAtomically
+from rcl_interfaces.srv import GetParameters, SetParametersAtomically
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.parameter import parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 
 CHAIN = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node')
@@ -29,7 +30,7 @@ TRANSITION_TIMEOUT_S = 300.0
 SET_TIMEOUT_S = 10.0
 RETRY_S = 3.0
 _SERVICES = {GetState: 'get_state', ChangeState: 'change_state',
-             SetParametersAtomically: 'set_parameters_atomically'}
+             GetParameters: 'get_parameters', SetParametersAtomically: 'set_parameters_atomically'}
 _GOALS = {Transition.TRANSITION_CONFIGURE: State.PRIMARY_STATE_INACTIVE,
           Transition.TRANSITION_ACTIVATE: State.PRIMARY_STATE_ACTIVE,
           Transition.TRANSITION_DEACTIVATE: State.PRIMARY_STATE_INACTIVE,
@@ -44,18 +45,22 @@ class Supervisor:
     """
 
     def __init__(self, names=CHAIN, parameters=None, namespace='/hooc', isolated=False,
-                 verbose=False, params_file=None, modules=None):
+                 verbose=False, params_file=None, modules=None, defaults=None):
         """
         Take note of what to start.
 
         :param parameters: {node name: {parameter: value}}.
+        :param namespace: of the nodes; HoocError where ROS takes no such one.
         :param isolated: keep apart from all other ROS traffic.
         :param params_file: YAML of the user; `parameters` win over it.
         :param modules: {node name: module}, in tests.
+        :param defaults: {node name: {parameter: value}} that hold where neither the file nor
+            `parameters` say otherwise.
         """
-        self.names, self.namespace = tuple(names), namespace
+        self.names, self.namespace = tuple(names), full_namespace(namespace)
         self._parameters = {name: dict(values) for name, values in (parameters or {}).items()}
         self._isolated, self._verbose, self._modules = isolated, verbose, modules or {}
+        self._defaults = defaults or {}
         self._params_file = Path(params_file) if params_file else None
         if self._params_file and not self._params_file.is_file():
             raise HoocError(f'{params_file}: there is no such file of parameters')
@@ -66,8 +71,11 @@ class Supervisor:
         """Start the processes and wait until all of them can be talked to."""
         self._old_handlers = {}
         try:
-            for number in (signal.SIGTERM, signal.SIGHUP):
-                self._old_handlers[number] = signal.signal(number, _exit_by_signal)
+            # A shell without job control starts what is in the background with SIGINT ignored.
+            for number, handler in ((signal.SIGINT, signal.default_int_handler),
+                                    (signal.SIGTERM, _exit_by_signal),
+                                    (signal.SIGHUP, _exit_by_signal)):
+                self._old_handlers[number] = signal.signal(number, handler)
         except ValueError:
             pass    # not in the main thread: whoever is there handles signals
         try:
@@ -134,7 +142,7 @@ class Supervisor:
         """Start the process of a node, with all parameters that are known of it."""
         self.processes[name] = NodeProcess(
             name, self._parameters.get(name, {}), self.namespace, self._params_file,
-            self._verbose, self._modules.get(name))
+            self._verbose, self._modules.get(name), self._defaults.get(name))
 
     def remember(self, name, values):
         """Note parameters that were changed, for a process that has to be started again."""
@@ -244,6 +252,13 @@ class Supervisor:
         if not result.successful:
             raise HoocError(f'{name}: {result.reason}')
         self.remember(name, values)
+
+    def get_parameters(self, name, parameters):
+        """Return {parameter: value} of one node; None for what it has not declared."""
+        request = GetParameters.Request(names=list(parameters))
+        values = self._ask(name, GetParameters, request, SET_TIMEOUT_S,
+                           f'{name} does not answer').values
+        return dict(zip(parameters, map(parameter_value_to_python, values)))
 
     def _ask(self, name, kind, request, timeout_s, complaint):
         """Return the response to a request that may be repeated, and is every RETRY_S."""

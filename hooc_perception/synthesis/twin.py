@@ -66,6 +66,8 @@ class TwinOptions:
                 raise HoocError(f'there is no scene {name!r}; choose among {", ".join(SCENES)}')
         if not 1 <= self.cameras <= 8:
             raise HoocError(f'{self.cameras} cameras were asked for; give 1 to 8')
+        if not 0 <= self.strength <= 2:
+            raise HoocError(f'the strength is {self.strength:g}; give a number from 0 to 2')
 
 
 def write_twin(out_dir, seed=0, options=TwinOptions(), progress=False, jobs=1):

@@ -17,6 +17,8 @@ from hooc_perception.supervisor import environment  # noqa: E402
 from hooc_perception.supervisor.keeper import Keeper  # noqa: E402
 from hooc_perception.supervisor.shared_memory import free_orphans  # noqa: E402
 from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor  # noqa: E402
+from rosgraph_msgs.msg import Clock  # noqa: E402
+from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 
 @pytest.fixture
@@ -47,12 +49,15 @@ def statuses(node):
 
 
 def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment):
-    with Supervisor((*CHAIN, REPLAY), cheap_chain(repository, cheap), isolated=True) as supervisor:
+    with Supervisor((*CHAIN, REPLAY), cheap_chain(repository, cheap), isolated=True,
+                    params_file=repository / 'config' / 'perception.yaml') as supervisor:
         supervisor.bring_up()
         keeper = Keeper(supervisor, pause_s=0.1)
-        heard, latest = [], statuses(supervisor.node)
+        heard, markers, latest = [], [], statuses(supervisor.node)
         supervisor.node.create_subscription(PoseArray, 'objects/poses', heard.append,
                                             qos('objects/poses'))
+        supervisor.node.create_subscription(MarkerArray, 'objects/markers', markers.append,
+                                            qos('objects/markers'))
 
         def until(condition, timeout_s=60.0):
             deadline = time.monotonic() + timeout_s
@@ -68,14 +73,44 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
         # A change at run time outlives the process that it was made in.
         supervisor.set_parameters('ingestion_node', {'max_set_spread_s': 0.25})
         for name in CHAIN:
+            shown = {(m.ns, m.id) for m in markers[-1].markers if m.action == m.ADD}
             os.kill(supervisor.processes[name].pid, signal.SIGKILL)
             heard.clear()
+            markers.clear()
             assert until(lambda: heard and not heard[-1].poses), 'the answer is not taken back'
+            assert until(lambda: shown <= {
+                (m.ns, m.id) for message in markers for m in message.markers
+                if m.action == m.DELETE and m.header.frame_id == 'table'}), markers
             assert until(lambda: said(name)), latest
             assert until(lambda: not keeper.reviving() and heard[-1].poses), f'no {name}'
         assert keeper.deaths == dict.fromkeys(CHAIN, 1)
-        assert supervisor._parameters['ingestion_node']['max_set_spread_s'] == 0.25
+        # The file that the node was started with again says 0.1.
+        assert supervisor.get_parameters('ingestion_node', ['max_set_spread_s']) == {
+            'max_set_spread_s': 0.25}
         assert until(lambda: 'hooc_supervisor: parsing_node' in latest)
+
+
+def test_the_keeper_speaks_in_the_frame_and_by_the_clock_of_the_dead(own_environment):
+    given = {'target_frame': 'bench', 'use_sim_time': True, 'parse.rounds': 3,
+             'more_timeout_s': 50.0}
+    with Supervisor(('parsing_node',), {'parsing_node': given}, isolated=True) as supervisor:
+        keeper, heard = Keeper(supervisor, pause_s=0.1, hung_s=100.0), []
+        # Three rounds, in each of which it may wait for others.
+        assert keeper._pulses['parsing_node'].hung_s == 250.0
+        supervisor.set_parameters('parsing_node', {'target_frame': 'rig', 'parse.rounds': 1})
+        clock = supervisor.node.create_publisher(Clock, '/clock', 1)
+        supervisor.node.create_subscription(PoseArray, 'objects/poses', heard.append,
+                                            qos('objects/poses'))
+        os.kill(supervisor.processes['parsing_node'].pid, signal.SIGKILL)
+        deadline = time.monotonic() + 30
+        while time.monotonic() < deadline and not any(
+                m.header.stamp.sec == 1000 and m.header.frame_id == 'rig' for m in heard):
+            message = Clock()
+            message.clock.sec = 1000
+            clock.publish(message)
+            keeper.spin(0.02)
+        assert heard[-1].header.frame_id == 'rig' and heard[-1].header.stamp.sec == 1000
+        assert keeper._pulses['parsing_node'].hung_s == 150.0
 
 
 def test_a_node_that_hangs_is_ended_and_comes_back(own_environment):

@@ -125,12 +125,32 @@ def test_perception_starts_the_chain(launch, repository):
         # A handler hears only what happens after it was registered.
         assert order_of(actions, node) == ['handler', 'configure', 'node']
         assert node.respawn.perform(None) == 'true'
+        # What is given comes after the file and wins.
         params, own = node.parameters
         assert params == '/p.yaml' and own['cameras'] == ['left', 'right']
         assert own['seed'] == 3 and own['use_sim_time'] is True and own['model'].startswith('/')
+        assert own['profile'] == 'fast' and own['target_frame'] == 'table'
     default, = (a.default_value for a in description if a.kind == 'DeclareLaunchArgument'
                 and a.args[0] == 'params_file')
     assert yaml.safe_load(open(default))
+
+
+@pytest.mark.parametrize('given, left', [
+    ({}, {}), ({'seed': '0', 'use_sim_time': 'false'}, {'seed': 0, 'use_sim_time': False}),
+    ({'cameras': '[]'}, {}), ({'target_frame': 'rig'}, {'target_frame': 'rig'})])
+def test_what_is_not_given_is_up_to_the_file(launch, monkeypatch, given, left):
+    description = launch('perception')
+    defaults = {a.args[0]: a.default_value for a in description
+                if a.kind == 'DeclareLaunchArgument' and hasattr(a, 'default_value')}
+    for name, value in {**defaults, **given}.items():
+        monkeypatch.setitem(GIVEN, name, value)
+    opaque, = (a for a in description if a.kind == 'OpaqueFunction')
+    nodes = [a for a in opaque.function(SimpleNamespace()) if a.kind == 'LifecycleNode']
+    assert len(nodes) == 4
+    for node in nodes:
+        params, own = node.parameters
+        assert params.endswith('perception.yaml')
+        assert {key: value for key, value in own.items() if key != 'model'} == left
 
 
 def test_replay_plays_a_bag_into_it(launch):

@@ -143,6 +143,17 @@ def test_parameters_that_nobody_takes_are_reported(bench, name, word):
     assert code == 'unknown_parameter' and word in sentence, sentence
 
 
+@pytest.mark.parametrize('name, word', [
+    ('kinect-1', 'such as kinect_1'), ('2nd', 'such as _2nd'), ('a//b', 'digits and _'),
+    ('', 'digits and _'), ('left/wrist', None)])
+def test_cameras_that_no_topic_can_be_named_after_are_refused(bench, name, word):
+    node = bench.add(ingestion_node.IngestionNode, cameras=[name], warm_up=False)
+    assert (node.trigger_configure() == SUCCESS) == (word is None)
+    if word:
+        sentence = bench.reasons(node)['node'][1]
+        assert repr(name) in sentence and word in sentence and 'unexpected' not in sentence
+
+
 def test_what_other_nodes_take_is_not_reported(bench):
     """As in a section for all nodes."""
     node = bench.add(ingestion_node.IngestionNode, cameras=['a'], warm_up=False,

@@ -11,6 +11,7 @@ import time
 
 from hooc_perception.errors import HoocError
 import pytest
+import yaml
 
 pytest.importorskip('rclpy')
 
@@ -20,8 +21,8 @@ from hooc_perception.supervisor.supervisor import Supervisor  # noqa: E402
 PARENT = """
 import signal
 import sys
-# A shell that starts tests in the background has their children ignore Ctrl-C.
-signal.signal(signal.SIGINT, signal.default_int_handler)
+# As in a script that starts it in the background.
+signal.signal(signal.SIGINT, signal.SIG_IGN)
 from hooc_perception.supervisor.supervisor import Supervisor
 with Supervisor(('replay_node', 'ingestion_node'), isolated=True) as supervisor:
     print(*[p.pid for p in supervisor.processes.values()], flush=True)
@@ -116,9 +117,10 @@ def test_lost_answers_are_asked_for_again(monkeypatch, tmp_path):
         supervisor._clients = forgetful
         assert supervisor.state('replay_node') == 1
         supervisor.set_parameters('replay_node', {'rate': 2.0})
+        assert supervisor.get_parameters('replay_node', ['rate']) == {'rate': 2.0}
         with pytest.raises(HoocError, match='parameter bag is empty'):
             supervisor.bring_up()
-        assert [c.calls >= 2 for c in forgetful.values()] == [True] * 3
+        assert [c.calls >= 2 for c in forgetful.values()] == [True] * 4
 
 
 def test_a_broken_parameter_file_ends_in_a_sentence(tmp_path):
@@ -135,6 +137,45 @@ def test_the_shipped_parameter_file_is_accepted(repository):
     with Supervisor(('replay_node', 'ingestion_node'), isolated=True,
                     params_file=repository / 'config' / 'perception.yaml'):
         pass
+
+
+@pytest.mark.parametrize('order', [1, -1])
+def test_what_is_asked_for_wins_over_every_section_of_the_users_file(tmp_path, order):
+    """In ROS, the section that is first named last wins, even over -p."""
+    sections = {'/**': {'rate': 1.0, 'answer_timeout_s': 11.0, 'bag': 'theirs'},
+                '/**/replay_node': {'rate': 2.0, 'match_timeout_s': 12.0},
+                '/hooc/replay_node': {'rate': 3.0},
+                '/**/ingestion_node': {'wait_for_subscribers': 7}}
+    path = tmp_path / 'p.yaml'
+    path.write_text(yaml.safe_dump(
+        {name: {'ros__parameters': values} for name, values in list(sections.items())[::order]},
+        sort_keys=False))
+    with Supervisor(('replay_node',), {'replay_node': {'rate': 5.0}}, isolated=True,
+                    params_file=path, defaults={'replay_node': {
+                        'bag': 'ours', 'wait_for_subscribers': 4, 'rate': 6.0}}) as supervisor:
+        assert supervisor.get_parameters('replay_node', [
+            'rate', 'answer_timeout_s', 'match_timeout_s', 'bag', 'wait_for_subscribers']) == {
+                'rate': 5.0, 'answer_timeout_s': 11.0, 'match_timeout_s': 12.0, 'bag': 'theirs',
+                'wait_for_subscribers': 4}
+
+
+def test_values_arrive_with_their_types():
+    """What looks like a number or a truth value in YAML stays text, and 5.0 a float."""
+    given = {'model': '1e3', 'target_frame': 'on', 'cameras': ['7', '~', 'a: b', 'Grüße 😀'],
+             'max_frame_age_s': 5.0, 'min_cameras': 2, 'warm_up': False}
+    with Supervisor(('ingestion_node',), {'ingestion_node': given}, isolated=True) as supervisor:
+        assert supervisor.get_parameters('ingestion_node', given) == given
+
+
+@pytest.mark.parametrize('namespace, full', [
+    ('/hooc', '/hooc'), ('robot1/', '/robot1'), ('', '/'), ('/a/b_2', '/a/b_2'), ('a b', None),
+    ('/2nd', None), ('/a//b', None), ('kinect-1', None)])
+def test_a_namespace_that_ros_refuses_is_named_before_anything_starts(namespace, full):
+    if full:
+        assert Supervisor(namespace=namespace).namespace == full
+        return
+    with pytest.raises(HoocError, match='the namespace .* cannot be used: give letters'):
+        Supervisor(namespace=namespace)
 
 
 def test_parallel_runs_get_domains_of_their_own():

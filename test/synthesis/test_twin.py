@@ -153,6 +153,9 @@ def test_wrong_options_are_refused():
         twin.TwinOptions(scenes=('99_9',))
     with pytest.raises(HoocError, match='0 cameras'):
         twin.TwinOptions(cameras=0)
+    for strength in (-0.1, 2.1, float('nan'), float('inf')):
+        with pytest.raises(HoocError, match='the strength is .* from 0 to 2'):
+            twin.TwinOptions(strength=strength)
 
 
 def test_a_set_is_not_written_over_another(small, tmp_path):

@@ -3,6 +3,7 @@
 """`hooc replay`: a bag as live cameras."""
 
 from pathlib import Path
+import sys
 
 from hooc_perception.errors import HoocError
 
@@ -33,6 +34,8 @@ def run(args):
     if not 0 <= args.rate <= 100 or not args.wait > 0:
         raise HoocError('--rate must be from 0 to 100 and --wait positive')
     bag = BagScene(args.bag)
+    if bag.incomplete:
+        print(f'warning: {bag.incomplete}', file=sys.stderr)
     parameters = {REPLAY: {'bag': str(args.bag.resolve()), 'rate': args.rate, 'loop': args.loop,
                            'match_timeout_s': args.wait}}
     with Supervisor((REPLAY,), parameters, args.namespace) as supervisor:

@@ -3,6 +3,7 @@
 """`hooc run`: replayed bags through the five nodes."""
 
 from pathlib import Path
+import sys
 
 from hooc_perception.errors import HoocError
 
@@ -49,6 +50,8 @@ def run(args):
     for bag in bags:
         if names.count(bag.name) > 1:
             raise HoocError(f'two bags hold the scene {bag.name!r}; run them one at a time')
+        if bag.incomplete:
+            print(f'warning: {bag.incomplete}', file=sys.stderr)
         bag.views()     # a bag that cannot be used is better refused before anything starts
     answers, profile, seed = play(bags, args, model)
     classes = [m.name for m in model.models]

@@ -64,8 +64,9 @@ class Fusion:
     The last images of one camera; what changes begins anew, block by block.
 
     A block that differs from the images before shows the new image at once; where the next image
-    differs as well, those before are forgotten. So an object that is moved or taken away is never
-    shown by images that are newer, and a block that flickers once loses nothing.
+    differs as well, those before are forgotten. So an object that is moved or taken away is not
+    shown by newer images, unless it rises hardly above the noise, and a block that flickers once
+    loses nothing.
     """
 
     def __init__(self):

@@ -245,6 +245,8 @@ def check_geometry(path, config=ObserveConfig()):
     """Yield what the calibration does to the picture: poses, the table, what stands on it."""
     try:
         bag = BagScene(path)
+        if bag.incomplete:
+            yield Finding(WARNING, 'cameras', bag.incomplete)
         if not bag.table_known:
             yield Finding(WARNING, 'world frame', 'no frame is known to be the table, so it is '
                           'estimated from the depth; publish a frame called "table" on '

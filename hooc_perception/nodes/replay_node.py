@@ -52,6 +52,8 @@ class ReplayNode(StageNode):
         if not self.config.bag:
             raise HoocError('parameter bag is empty; set it to a rosbag2 folder or file')
         self.bag = BagScene(self.config.bag)
+        if self.bag.incomplete:
+            self.diagnostics.warn('bag', 'missing_camera', self.bag.incomplete)
         self.frame = self.bag.info['world_frame'] or 'table'
         self.cameras = {camera.name: camera for camera in self.bag.cameras}
         self.outputs = {name: (

@@ -17,7 +17,11 @@ from hooc_perception.core.depth_encodings import decode_depth, decode_image
 from hooc_perception.core.types import DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.replay.bag_files import BagMessage, BagTopic, iter_messages, topics
-from hooc_perception.replay.camera_topics import camera_from_info, depth_topics
+from hooc_perception.replay.camera_topics import (
+    camera_from_info,
+    cameras_without_depth,
+    depth_topics,
+)
 from hooc_perception.replay.frames import FrameTree, plain
 from hooc_perception.scenes import camera_files, files
 from hooc_perception.scenes.scene import TrueObject
@@ -64,6 +68,17 @@ class BagScene:
             cameras.append(camera_from_info(name, topic, infos, firsts[topic], self.path))
             frames[name] = firsts[topic].header.frame_id
         self._source_cameras = self._posed(cameras, frames, world_frame)
+
+    @property
+    def incomplete(self):
+        """Say of which cameras the bag holds no depth image, None where there is none."""
+        names = cameras_without_depth(self.topics, self.depth_topics,
+                                      self.info.get('cameras') or [])
+        if not names:
+            return None
+        return (f'{self.path}: there is no depth image of {", ".join(names)}, though the bag '
+                'names it as a camera, so only '
+                f'{", ".join(self.depth_topics)} will be used; record its depth topic, too')
 
     @property
     def table_known(self):

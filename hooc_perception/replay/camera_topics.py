@@ -72,6 +72,27 @@ def camera_from_info(name, topic, infos, image, path):
                   camera_files.distortion(D.tolist(), model, where), np.eye(4), model)
 
 
+def cameras_without_depth(topics, found, listed):
+    """
+    Return the names of cameras that a bag speaks of without any depth image of theirs.
+
+    Calibrations, poses and empty topics beside a depth image speak of a camera.
+
+    :param topics: {name: BagTopic}.
+    :param found: the names that `depth_topics` has found.
+    :param listed: the names in scene_info.
+    """
+    names = set(listed)
+    for topic, details in topics.items():
+        folder, _, last = topic.rpartition('/')
+        kind = details.type_name.rpartition('/')[2]
+        if (kind == 'TransformStamped' and last == 'extrinsics'
+                or kind == 'CameraInfo' and 'depth' in topic.lower()
+                or kind == 'Image' and 'depth' in topic.lower() and not details.count):
+            names.add(_camera_name(folder))
+    return sorted(names - set(found))
+
+
 def _rank(topic):
     """Sort the rawest state of an image first, then by name."""
     state = topic.rpartition('/')[2]

@@ -234,6 +234,43 @@ def test_no_depth_at_all(sound, tmp_path):
     assert 'no depth topic' in found(rewritten(sound, tmp_path / 'bag', edit), ERROR)
 
 
+SPEAKS_OF_IT = {'/hooc/camera2/depth/camera_info', '/hooc/camera2/extrinsics',
+                '/hooc/scene_info'}
+
+
+@pytest.mark.parametrize('kept', [SPEAKS_OF_IT, *({name} for name in sorted(SPEAKS_OF_IT))])
+def test_a_camera_without_images_is_missed(sound, tmp_path, kept):
+    gone = {'/hooc/camera2/depth/image_raw', *SPEAKS_OF_IT} - kept
+    bag = rewritten(sound, tmp_path / 'bag',
+                    lambda topic, message, i: None if topic in gone else message)
+    text = found(bag, WARNING)
+    assert 'no depth image of camera2' in text and 'only camera0, camera1' in text
+    assert not found(bag, ERROR)
+
+
+@pytest.mark.parametrize('command', ['run', 'replay'])
+def test_commands_warn_of_a_camera_without_images(sound, tmp_path, command, monkeypatch, capsys,
+                                                  repository):
+    from hooc_perception.errors import HoocError
+    pytest.importorskip('rclpy')
+    model = repository / 'models' / 'demo'
+    if not (model / 'model.json').is_file():
+        pytest.skip('no bundled model')
+
+    def enough(*args, **kwargs):
+        raise HoocError('enough')
+
+    monkeypatch.setattr('hooc_perception.cli.run.play', enough)
+    monkeypatch.setattr('hooc_perception.supervisor.supervisor.Supervisor', enough)
+    bag = rewritten(sound, tmp_path / 'bag', drop('/hooc/camera2/depth/image_raw'))
+    for path, warned in ((bag, True), (sound, False)):
+        assert main([command, str(path), *(
+            ['--model', str(model), '--out', 'o.json'] if command == 'run' else [])]) == 1
+        printed = capsys.readouterr().err
+        assert ('warning: ' in printed and 'camera2' in printed) == warned
+        assert 'enough' in printed
+
+
 def test_truncated_file(sound, tmp_path):
     folder = rewritten(sound, tmp_path / 'bag')
     storage = next(folder.glob('*.mcap'))

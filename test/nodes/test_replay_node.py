@@ -9,6 +9,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from hooc_perception.nodes.replay_node import ReplayNode  # noqa: E402
+from hooc_perception.replay.bag_reader import BagScene  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
@@ -33,3 +34,13 @@ def test_each_activation_plays_the_bag_with_the_same_timer(bench, repository):
         assert len(list(node.timers)) == timers
         # Inactive, it does nothing: the player has played all and is not asked again.
         assert node.timer.is_canceled()
+
+
+def test_a_camera_without_images_is_named(bench, repository, monkeypatch):
+    bag = repository / 'bags' / 'demo'
+    if not (bag / 'metadata.yaml').is_file():
+        pytest.skip('no bundled scene')
+    monkeypatch.setattr(BagScene, 'incomplete', 'there is no depth image of b')
+    node = bench.add(ReplayNode, bag=str(bag))
+    assert node.trigger_configure() == SUCCESS
+    assert bench.reasons(node)['bag'] == ('missing_camera', 'there is no depth image of b')

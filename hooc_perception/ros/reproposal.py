@@ -70,6 +70,10 @@ class Proposers:
         """Return how many are kept."""
         return len(self._kept)
 
+    def __contains__(self, stamp_ns):
+        """Return whether that of a stamp is kept."""
+        return stamp_ns in self._kept
+
     def keep(self, stamp_ns, proposer):
         """Keep the callable (objects, round) -> Candidates of a stamp; the oldest makes room."""
         self._kept[stamp_ns] = proposer

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 import threading
+import time
 
 from hooc_perception.core.types import Candidates
 from hooc_perception.errors import HoocError
@@ -13,12 +14,13 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.nodes.candidate_node import CandidateNode  # noqa: E402
+from hooc_perception.nodes import candidate_node, parsing_node  # noqa: E402
 from hooc_perception.ros import reproposal  # noqa: E402
 from hooc_perception.ros.conversions import header  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
 from hooc_perception.ros.stage_messages import candidates_messages  # noqa: E402
 from hooc_perception.ros.stage_node import StageConfig, StageNode  # noqa: E402
+from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 
@@ -143,7 +145,7 @@ def test_answers_of_another_model_bring_nothing(bench, asking, flaw):
 @pytest.fixture
 def proposing(bench, asking, folder):
     """Return (asking node, active candidate node that it asks)."""
-    node = bench.add(CandidateNode, model=str(folder.path), warm_up=False)
+    node = bench.add(candidate_node.CandidateNode, model=str(folder.path), warm_up=False)
     node.trigger_configure()
     node.trigger_activate()
     topics = ('/hooc/candidates/requests', '/hooc/candidates/more/poses')
@@ -192,3 +194,39 @@ def test_a_round_that_fails_is_answered(bench, proposing):
     node.proposers.keep(2, lambda objects, turn: some(0))
     asking.diagnostics._counts.clear()
     assert len(answered(bench, asking, 2)) == 0 and not asking.diagnostics._counts
+
+
+@pytest.mark.parametrize('younger, found', [(3, 2), (4, 0)])
+def test_sets_that_overtake_a_parse_do_not_stop_the_chain(bench, make_chain, monkeypatch,
+                                                          younger, found):
+    monkeypatch.setattr(candidate_node, 'proposer', lambda *_: lambda objects, turn: objects)
+    stages, send = make_chain(parameters={0: {'wait_for_answer_s': 0.0},
+                                          3: {'more_timeout_s': 20.0}})
+    candidates, parsing = bench.chain[2:]
+    answers = bench.hear(PoseArray, 'objects/poses', qos('objects/poses'))
+    # As in processes of their own: they work on while parsing waits.
+    others = SingleThreadedExecutor(context=bench.context)
+    for node in bench.chain[:3]:
+        bench.executor.remove_node(node)
+        others.add_node(node)
+    threading.Thread(target=others.spin, daemon=True).start()
+    parse, first = stages.parse, []
+
+    def overtaken(*args):
+        monkeypatch.setattr(parsing_node, 'parse', parse)
+        for _ in range(younger):
+            stamp, deadline = send(), time.monotonic() + 10
+            while stamp not in candidates.proposers and time.monotonic() < deadline:
+                time.sleep(0.005)
+        stages.turns = (1,)
+        parsed = parse(*args)
+        first.append(stages.asked[0])
+        return parsed
+    monkeypatch.setattr(parsing_node, 'parse', overtaken)
+    send()
+    assert bench.spin(lambda: answers, 30.0)
+    others.shutdown()
+    assert len(first[0]) == found
+    code, sentence = bench.reasons(parsing)['parse']
+    assert code == ('ok' if found else 'no_more_candidates')
+    assert found or 'could not answer' in sentence, 'it waited in vain'

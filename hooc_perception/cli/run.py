@@ -121,7 +121,7 @@ def write_report(folder, bags, answers, entries, model, profile, seed):
     from hooc_perception.evaluation.report.page import write_report as write_page
     from hooc_perception.evaluation.report.scene import report_scene
     models = {m.name: m for m in model.models}
-    scenes = [report_scene(entry, bag.views(), models, bag.truth,
+    scenes = [report_scene(entry, bag.views(answer.images), models, bag.truth,
                            probabilities=answer.probabilities, pool=answer.parsed.pool)
               for entry, bag, answer in zip(entries, bags, answers)]
     path = write_page(folder, scenes, f'What stands on the table: {bags[0].info["dataset"]}',

@@ -10,11 +10,11 @@ from hooc_perception.errors import HoocError
 from hooc_perception.scenes import camera_files, files
 from hooc_perception.scenes.bop import is_bop, load_bop
 from hooc_perception.scenes.scene import Category, Scene, TrueObject
+from hooc_perception.scenes.truth import true_object
 from hooc_perception.scenes.writer import FORMAT, NewScene, write_scene_set
 
 # Class ids and instance labels travel as 8-bit images in which 0 is the background.
 MAX_CATEGORIES = 255
-MAX_METRES = 1000.0
 # The world_frame of sets whose poses are not in a table's frame.
 UNKNOWN_WORLD = 'unknown'
 
@@ -198,27 +198,5 @@ def _truth(file, categories):
     known = {category.name for category in categories}
     objects = files.read_yaml(file)
     objects = files.sequence(files.required(objects, 'objects', f'{file}:'), f'{file}: objects')
-    return tuple(_true_object(item, f'{file}: objects[{i}]', known)
+    return tuple(true_object(item, f'{file}: objects[{i}]', known)
                  for i, item in enumerate(objects))
-
-
-def _true_object(item, where, known):
-    """Return one TrueObject; `where` names file and row."""
-    item = files.mapping(item, where)
-    category = files.required(item, 'category', f'{where}:')
-    if not isinstance(category, str) or category not in known:
-        raise HoocError(f'{where} category is {files.shown(category)}, which is not in '
-                        'dataset.yaml; add it there or correct the name')
-    where = f'{where} ({category})'
-    translation, rotation = camera_files.pose(item, where)
-    if abs(translation).max() > MAX_METRES:
-        raise HoocError(f'{where} translation is {translation.tolist()}; give metres')
-    size = files.numbers(files.required(item, 'size', where), 3, f'{where} size')
-    if size.min() <= 0 or size.max() > MAX_METRES:
-        raise HoocError(f'{where} size is {size.tolist()}; give three positive lengths in metres')
-    visibility = item.get('surface_visibility')
-    if visibility is not None:
-        visibility = files.number(visibility, f'{where} surface_visibility')
-        if not 0 <= visibility <= 1:
-            raise HoocError(f'{where} surface_visibility is {visibility:g}; give a share 0 to 1')
-    return TrueObject(category, translation, rotation, size, visibility)

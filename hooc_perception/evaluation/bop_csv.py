@@ -3,11 +3,11 @@
 """Export results in the CSV format of the BOP challenge: scene_id,im_id,obj_id,score,R,t,time."""
 
 import io
-from pathlib import Path
 import re
 
 from hooc_perception.core.geometry import inverse, matrix_from_pose
 from hooc_perception.evaluation.matching import in_frame_of, posed
+from hooc_perception.scenes.files import write_atomically
 import numpy as np
 import trimesh
 
@@ -48,9 +48,7 @@ def write_bop_csv(path, results, scene_set):
                     str(numbers[thing.category]), f'{thing.score:.6f}',
                     ' '.join(f'{x:.9f}' for x in T[:3, :3].ravel()),
                     ' '.join(f'{1000 * x:.6f}' for x in t), f'{entry["seconds"]:.6f}']))
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text('\n'.join(rows) + '\n')
+    write_atomically(path, '\n'.join(rows) + '\n')
     return len(rows) - 1
 
 

@@ -56,10 +56,10 @@ class SceneSet:
         raise HoocError(f'{self.path}: there is no scene {name!r}; choose one of {known}')
 
     def selected(self, names):
-        """Return a set with these scenes only, in this order (all where `names` is empty)."""
+        """Return a set with these scenes only, each once, in this order (no `names`: all)."""
         if not names:
             return self
-        return replace(self, scenes=tuple(self.scene(name) for name in names))
+        return replace(self, scenes=tuple(self.scene(name) for name in dict.fromkeys(names)))
 
 
 def load_scene_set(path, with_scenes=True):

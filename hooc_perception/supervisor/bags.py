@@ -60,6 +60,11 @@ class BagRunner:
         supervisor.bring_down([REPLAY])
         return answer
 
+    def start_over(self):
+        """Bring all nodes down after a scene that failed; HoocError where one has died."""
+        self._rig = None
+        self._supervisor.bring_down()
+
     def _listen(self, bag, began):
         """Return the Answer once the bag is played and the chain has answered."""
         supervisor, collector = self._supervisor, self._collector

@@ -308,3 +308,20 @@ def test_views_of_a_later_frame_set(tmp_path):
     assert bag.views({'c': 1})[0].depth[0, 0] == bag.views({'c': 2})[0].depth[0, 0] == 2
     with pytest.raises(HoocError, match='no such frame set'):
         bag.views({'c': 3})
+
+
+def test_zeros_behind_the_coefficients_and_a_skew_are_taken_as_live_nodes_take_them(tmp_path):
+    lens, skew = [0.1, -0.2, 0.001, 0.002, 0.01, 0.3, 0.1, 0.02], np.array(K)
+    skew[0, 1] = 2.0
+    for i, (zeros, accepted) in enumerate((([0.0] * 6, True), ([0.0] * 5 + [0.1], False))):
+        bag = write(tmp_path / f'b{i}', [
+            ('/c/depth/camera_info', INFO, info(k=skew, d=lens + zeros,
+                                                model='rational_polynomial')),
+            ('/c/depth/image_raw', IMAGE, depth_image(DEPTH))])
+        if accepted:
+            camera, = BagScene(bag)._source_cameras
+            np.testing.assert_array_equal(camera.D, lens)
+            np.testing.assert_array_equal(camera.K, skew)
+        else:
+            with pytest.raises(HoocError, match='D has 14 numbers'):
+                BagScene(bag)

@@ -40,6 +40,9 @@ def add_arguments(parser):
 
 def run(args):
     """Run the command; return the exit code."""
+    from hooc_perception.cli.places import file_place
+    file_place(args.json, '--json')
+    file_place(args.plot, '--plot')
     if args.fuzz is not None:
         return _fuzz(args.fuzz, args.seed)
     if args.soak is not None:
@@ -81,10 +84,7 @@ def run(args):
         times = chain_times(folder, scene)
         _print_chain(times)
     if args.json:
-        args.json.parent.mkdir(parents=True, exist_ok=True)
-        content = _content(entries, quality, times, args.seed)
-        args.json.write_text(json.dumps(content, indent=1) + '\n')
-        print(args.json)
+        _write_json(args.json, _content(entries, quality, times, args.seed))
 
 
 def _fuzz(cases, seed):
@@ -121,13 +121,18 @@ def _growth(args):
                    f'views (dotted), and what changes; profile {profile}')
         print(args.plot)
     if args.json:
-        args.json.parent.mkdir(parents=True, exist_ok=True)
         rows = {axis: [{**vars(p), 'peak_mb': p.peak_mb if p.peak_mb == p.peak_mb else None}
                        for p in points] for axis, points in grown.items()}
-        args.json.write_text(json.dumps({'format': 'hooc-growth/1', 'profile': profile,
-                                         'seed': args.seed, 'axes': rows}, indent=1) + '\n')
-        print(args.json)
+        _write_json(args.json, {'format': 'hooc-growth/1', 'profile': profile,
+                                'seed': args.seed, 'axes': rows})
     return 0
+
+
+def _write_json(path, content):
+    """Write figures to a file and say so."""
+    from hooc_perception.scenes.files import write_atomically
+    write_atomically(path, json.dumps(content, indent=1) + '\n')
+    print(path)
 
 
 def _print_growth(grown, profile):
@@ -168,14 +173,13 @@ def _soak(args):
         write_plot(args.plot, result)
         print(args.plot)
     if args.json:
-        args.json.write_text(json.dumps({
+        _write_json(args.json, {
             'format': 'hooc-soak/1', 'minutes': args.soak, 'frames': result.frames,
             'sets': result.sets, 'answers': result.answers, 'deaths': result.deaths,
             'seconds': result.seconds.round(1).tolist(),
             'memory_mb': {n: m.round(1).tolist() for n, m in result.memory_mb.items()},
             'reasons': {f'{thing} {reason}': number
-                        for (thing, reason), number in sorted(result.reasons.items())}}) + '\n')
-        print(args.json)
+                        for (thing, reason), number in sorted(result.reasons.items())}})
     return int(not flat or result.deaths > 0)
 
 

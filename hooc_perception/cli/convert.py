@@ -43,10 +43,12 @@ def run(args):
 
 def write_bags(args):
     """Write one bag a scene."""
+    from hooc_perception.cli.places import folder_place
     from hooc_perception.replay.bag_writer import write_bag
     from hooc_perception.scenes.scene_set import load_scene_set
     from tqdm import tqdm
 
+    folder_place(args.out, '--out')
     scene_set = load_scene_set(args.set).selected(args.scene)
     for scene in tqdm(scene_set.scenes, desc='bags', unit='scene'):
         write_bag(scene, scene_set, args.out, args.storage, args.repeat, args.rate)

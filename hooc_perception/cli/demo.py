@@ -35,6 +35,8 @@ def add_arguments(parser):
 
 def run(args):
     """Run the command; return the exit code."""
+    from hooc_perception.cli.places import folder_place
+    folder_place(args.out, '--out')
     root = bundle_root(must_exist=not args.make_bundle)
     if args.make_bundle:
         make_bundle(root)
@@ -44,8 +46,8 @@ def run(args):
     from hooc_perception.replay.bag_reader import BagScene
     from hooc_perception.scenes.results import load_results
     results = args.out / 'results.json'
-    args.out.mkdir(parents=True, exist_ok=True)
-    run_command.run(_run_arguments(args, root, results))
+    if run_command.run(_run_arguments(args, root, results)):
+        return 1
     models = {model.name: model for model in load_model_folder(root / MODEL).models}
     entry = load_results(results)['scenes'][0]
     print('\n' + to_text(comparison(entry, BagScene(root / SCENE).truth, models)))

@@ -4,6 +4,7 @@
 
 import json
 from pathlib import Path
+import sys
 
 from hooc_perception.cli import executor_option
 from hooc_perception.errors import HoocError
@@ -51,6 +52,7 @@ def add_arguments(parser):
 
 def run(args):
     """Run the command; return the exit code."""
+    from hooc_perception.cli.categories import warn_of_gap
     from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models, table_1
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.scenes.results import load_results
@@ -64,9 +66,17 @@ def run(args):
                         'and the folder for them with --plots')
     if args.stages_from and not args.worst:
         raise HoocError('--stages-from serves --worst alone; say how many scenes that shall draw')
+    if args.bop_csv and not (args.results or args.baseline):
+        raise HoocError('--bop-csv needs a results file to write; name one')
+    _check_places(args)
     folder = load_model_folder(args.model) if args.model else None
-    scene_set = load_scene_set(args.set).selected(args.scene)
+    whole_set = load_scene_set(args.set)
+    scene_set = whole_set.selected(args.scene)
+    if folder:
+        warn_of_gap([m.name for m in folder.models], scene_set.category_names, args.set)
     contents = [load_results(path) for path in args.results]
+    for path, content in zip(args.results, contents):
+        _check_match(path, content, whole_set)
     labels = _labels(args.results)
     models = scoring_models(scene_set, args.seed)
     if args.baseline:
@@ -94,6 +104,28 @@ def run(args):
     return 0
 
 
+def _check_places(args):
+    """Raise HoocError where an output cannot be written: better than after the work."""
+    from hooc_perception.cli.places import file_place, folder_place
+    for name in ('json', 'markdown', 'bop_csv'):
+        file_place(getattr(args, name), f'--{name.replace("_", "-")}')
+    folder_place(args.plots, '--plots')
+    if args.baseline:
+        file_place(_baseline_place(args), '--out')
+
+
+def _check_match(path, content, scene_set):
+    """Refuse results that have no scene in common with the set; say what is not scored."""
+    from hooc_perception.scenes.results import scenes_in_common
+    known = {scene.name for scene in scene_set.scenes}
+    _, others = scenes_in_common(content, known, path, scene_set.path)
+    if others:
+        print(f'[WARN] {path}: {others} not in {scene_set.path} and left out', file=sys.stderr)
+    if content['dataset'] != scene_set.name:
+        print(f'[WARN] {path} is of the dataset {content["dataset"]!r}, {scene_set.path} is '
+              f'{scene_set.name!r}', file=sys.stderr)
+
+
 def _labels(paths):
     """Return a short label for each results file, unlike the others'."""
     paths = [Path(p) for p in paths]
@@ -103,11 +135,16 @@ def _labels(paths):
     return [f'{p.parent.name}/{p.stem}' for p in paths]
 
 
+def _baseline_place(args):
+    """Return where the baseline's results go."""
+    return Path(args.out or f'{args.baseline}.json')
+
+
 def _baseline(args, scene_set, models):
     """Run the baseline; return (path, content) of its results."""
     from hooc_perception.evaluation.baselines import run_baseline
     from hooc_perception.scenes.results import load_results
-    path = Path(args.out or f'{args.baseline}.json')
+    path = _baseline_place(args)
     run_baseline(args.baseline, scene_set, models, path, args.seed)
     return path, load_results(path)
 
@@ -145,6 +182,7 @@ def _visibility_tables(visibility):
 def _write(args, evaluations, contents, tables, scene_set, visibility, truth_energy, stages):
     """Print the tables and write whatever files were asked for."""
     from hooc_perception.evaluation.tables import to_markdown, to_text
+    from hooc_perception.scenes.files import write_atomically
 
     if not tables:
         raise HoocError(f'{args.set}: no scene has true poses or instance labels; there is '
@@ -153,11 +191,11 @@ def _write(args, evaluations, contents, tables, scene_set, visibility, truth_ene
     if args.markdown:
         full = _visibility_tables(visibility)
         full = [*(table for table in tables if table not in full), *full]
-        _file(args.markdown).write_text('\n'.join(to_markdown(table) for table in full))
+        write_atomically(args.markdown, '\n'.join(to_markdown(table) for table in full))
     if args.json:
         from hooc_perception.evaluation.as_json import as_json
         content = as_json(scene_set, evaluations, visibility, truth_energy, stages)
-        _file(args.json).write_text(json.dumps(content, indent=1, allow_nan=False) + '\n')
+        write_atomically(args.json, json.dumps(content, indent=1, allow_nan=False) + '\n')
     if args.plots:
         from hooc_perception.evaluation.plots import write_plots
         names = scene_set.category_names
@@ -165,8 +203,6 @@ def _write(args, evaluations, contents, tables, scene_set, visibility, truth_ene
                                  for e in evaluations if e.scores], names,
                     [e for e in evaluations if e.scores])
     if args.bop_csv:
-        if not contents:
-            raise HoocError('--bop-csv needs a results file to write; name one')
         from hooc_perception.evaluation.bop_csv import write_bop_csv
         write_bop_csv(args.bop_csv, contents[0], scene_set)
 
@@ -183,10 +219,3 @@ def _draw_worst(args, scene_set, evaluations, models, stages):
     scenes = worst.worst_scenes(scene_set, evaluations[0], models, args.worst, pools)
     print('\n' + to_text(worst.worst_table(worst.worst_json(label, scenes))))
     write_worst(args.plots, label, scenes, models)
-
-
-def _file(path):
-    """Return the path, its folder made."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    return path

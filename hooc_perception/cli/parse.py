@@ -31,8 +31,11 @@ def add_arguments(parser):
 
 
 def run(args):
-    """Parse every scene and write the results."""
+    """Parse every scene, write the results of those that could be; return the exit code."""
+    from hooc_perception.cli.categories import category_gap, warn_of_gap
+    from hooc_perception.cli.failures import tell_failures
     from hooc_perception.cli.overrides import overrides_of
+    from hooc_perception.cli.places import file_place, relative_place
     from hooc_perception.core.pipeline import Pipeline
     from hooc_perception.core.profiles import profile, with_overrides
     from hooc_perception.executor import executor, spread
@@ -41,6 +44,7 @@ def run(args):
     from hooc_perception.scenes.scene_set import load_scene_set
     from tqdm import tqdm
 
+    out = file_place(args.out, '--out')
     scene_set, folder = load_scene_set(args.set), load_model_folder(args.model)
     names = [m.name for m in folder.models]
     chosen = with_overrides(profile(args.profile or folder.profile),
@@ -48,30 +52,63 @@ def run(args):
     seed = folder.seed if args.seed is None else args.seed
     pipeline = Pipeline(folder.models, folder.classifier, chosen, seed, scene_set.max_instances,
                         args.sigmas)
-    scenes = (scene_set.selected(args.scene) if args.scene else scene_set).scenes
-    for scene in scenes if args.true_poses else ():
-        if scene.truth is None:
-            raise HoocError(f'scene {scene.name} has no ground_truth.yaml, which --true-poses '
-                            'needs; leave the option out')
-    results = []
+    scenes = scene_set.selected(args.scene).scenes
+    if args.true_poses:
+        _check_true_poses(scenes, names, category_gap(names, scene_set.category_names, args.set))
+    else:
+        warn_of_gap(names, scene_set.category_names, args.set)
+    setting = 'B' if args.true_poses else 'A'
+    results, failures = [], {}
     with executor(args.executor):
         # One scene at a time on the cores at hand, which the stages share out between them.
-        done = spread(_parsed, repeat(pipeline), (scene.depth() for scene in scenes),
-                      (scene.truth if args.true_poses else None for scene in scenes))
+        done = spread(_parsed, repeat(pipeline), (_read(s, args.true_poses) for s in scenes))
         for scene, (parsed, seconds) in zip(scenes, tqdm(
                 done, total=len(scenes), desc='parsing', unit='scene', disable=None)):
+            if isinstance(parsed, HoocError):
+                failures[scene.name] = parsed
+                continue
             results.append(scene_result(
                 scene.name, parsed, names, seconds, profile=chosen.name, seed=seed,
-                setting='B' if args.true_poses else 'A', stage_seconds=parsed.seconds,
-                **scene.world))
-    write_results(args.out, scene_set.name, results, setting='B' if args.true_poses else 'A')
-    print(f'{len(results)} scenes, {sum(len(r["objects"]) for r in results)} objects -> '
-          f'{args.out}')
+                setting=setting, stage_seconds=parsed.seconds, **scene.world))
+    if results or not failures:
+        write_results(out, scene_set.name, results, setting=setting,
+                      set=relative_place(args.set, out))
+        print(f'{len(results)} scenes, {sum(len(r["objects"]) for r in results)} objects -> '
+              f'{args.out}')
+    return tell_failures(failures)
 
 
-def _parsed(pipeline, views, truth):
-    """Return (ParsedScene, seconds) of DepthViews; of setting B where `truth` is given."""
+def _check_true_poses(scenes, known, gap):
+    """Refuse scenes whose true poses cannot all be among the candidates."""
+    for scene in scenes:
+        if scene.source_truth is None:
+            raise HoocError(f'scene {scene.name} has no ground_truth.yaml, which --true-poses '
+                            'needs; leave the option out')
+        if any(true.category not in known for true in scene.source_truth):
+            raise HoocError(f'--true-poses: {gap}')
+
+
+def _read(scene, with_truth):
+    """Return (DepthViews, truth or None) of a scene, or the HoocError that it gave."""
+    try:
+        return scene.depth(), scene.truth if with_truth else None
+    except HoocError as error:
+        return error
+
+
+def _parsed(pipeline, read):
+    """
+    Return (ParsedScene, seconds), or (HoocError, NaN) where the scene cannot be parsed.
+
+    :param read: what `_read` gave; the truth makes it setting B.
+    """
     from hooc_perception.evaluation.true_poses import with_true_poses
+    if isinstance(read, HoocError):
+        return read, float('nan')
+    views, truth = read
     change = None if truth is None else with_true_poses(truth, pipeline.models)
     start = time.monotonic()
-    return pipeline.parse_scene(views, change), time.monotonic() - start
+    try:
+        return pipeline.parse_scene(views, change), time.monotonic() - start
+    except HoocError as error:
+        return error, float('nan')

@@ -2,6 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc report`: results as one self-contained HTML page."""
 
+from pathlib import Path
+import sys
+from types import SimpleNamespace
+
 from hooc_perception.errors import HoocError
 
 HELP = ('Write results as one self-contained HTML page: every view with the measured and the '
@@ -13,8 +17,9 @@ def add_arguments(parser):
     """Declare the arguments."""
     parser.add_argument('results', metavar='RESULTS.json',
                         help='results of `hooc parse` or `hooc run`')
-    parser.add_argument('--set', metavar='SET', required=True,
-                        help='the scene set that the results are of')
+    parser.add_argument('--set', metavar='SET',
+                        help='the scene set that the results are of (default: the set, or the '
+                        'bags, that the results name)')
     parser.add_argument('--model', metavar='MODEL',
                         help='model folder: adds the most likely class of every pixel')
     parser.add_argument('--candidates', action='store_true',
@@ -27,42 +32,88 @@ def add_arguments(parser):
 
 def run(args):
     """Run the command; return the exit code."""
-    from hooc_perception.evaluation.evaluate import scoring_models
+    from hooc_perception.cli.places import page_place
     from hooc_perception.evaluation.matching import in_frame_of
     from hooc_perception.evaluation.report.page import write_report
     from hooc_perception.evaluation.report.scene import report_scene
     from hooc_perception.models.folder import load_model_folder
-    from hooc_perception.scenes.results import load_results
-    from hooc_perception.scenes.scene_set import load_scene_set
+    from hooc_perception.scenes.results import load_results, scenes_in_common
     from tqdm import tqdm
 
     if args.candidates and not args.model:
         raise HoocError('--candidates runs the chain again and needs a trained model; '
                         'give its folder with --model')
+    page_place(args.out, '--out')
     folder = load_model_folder(args.model) if args.model else None
     results = load_results(args.results)
-    scene_set = load_scene_set(args.set).selected(args.scene)
-    entries = {entry['scene']: entry for entry in results['scenes']}
-    shown = [scene for scene in scene_set.scenes if scene.name in entries]
-    if not shown:
-        raise HoocError(f'{args.results} and {args.set} have no scene in common'
-                        f'{" among " + ", ".join(args.scene) if args.scene else ""}; '
-                        'give the set that the results are of')
-    models, extras = scoring_models(scene_set), None
+    source = _source(args, results, folder)
+    entries, others = scenes_in_common(results, {s.name for s in source.scenes}, args.results,
+                                       source.place)
+    if others and not args.scene:
+        print(f'[WARN] {args.results}: {others} not in {source.place} and left out',
+              file=sys.stderr)
+    shown = [scene for scene in source.scenes if scene.name in entries]
+    extras = None
     if folder:
         from hooc_perception.evaluation.rerun import Rerun
         extras = Rerun(folder)
-        models = {model.name: model for model in extras.models}
     scenes = []
     for scene in tqdm(shown, desc='pictures', unit='scene', disable=None):
-        views = scene.depth()
-        more = extras.for_report(views, args.candidates) if extras else {}
         entry = in_frame_of(scene, entries[scene.name])
-        scenes.append(report_scene(entry, views, models, scene.truth, **more))
-    notes = [f'Set {scene_set.name}' + ''.join(
+        views = source.views(scene, entry)
+        more = extras.for_report(views, args.candidates) if extras else {}
+        scenes.append(report_scene(entry, views, source.models, scene.truth, **more))
+    notes = [f'Set {source.name}' + ''.join(
         f', {key} {results[key]}' for key in ('profile', 'seed', 'setting') if key in results)]
     path = write_report(args.out, scenes, f'What stands on the table: {results["dataset"]}',
                         notes)
     print(f'{path}: {len(scenes)} scene{"s" if len(scenes) != 1 else ""}, '
           f'{path.stat().st_size / 1e6:.1f} MB')
     return 0
+
+
+def _source(args, results, folder):
+    """
+    Return what the results are of: name, place, scenes and models {category: GenericModel}.
+
+    That is --set, else the set or the bags that the results name, relative to their own file.
+    """
+    from hooc_perception.models.folder import load_model_folder
+    base = Path(args.results).parent
+    place = args.set or _named(base, results, 'set')
+    if place:
+        from hooc_perception.evaluation.evaluate import scoring_models
+        from hooc_perception.scenes.scene_set import load_scene_set
+        scene_set = load_scene_set(place).selected(args.scene)
+        models = ({model.name: model for model in folder.models} if folder
+                  else scoring_models(scene_set))
+        return SimpleNamespace(name=scene_set.name, place=place, scenes=scene_set.scenes,
+                               models=models, views=lambda scene, entry: scene.depth())
+    from hooc_perception.replay.bag_reader import BagScene
+    wanted = args.scene or [entry['scene'] for entry in results['scenes']]
+    bags = {entry['scene']: bag for entry in results['scenes']
+            if entry['scene'] in wanted and (bag := _named(base, entry, 'bag'))}
+    model = _named(base, results, 'model')
+    if not bags or not (folder or model):
+        raise HoocError(f'{args.results} does not say which set or bags it is of, or they have '
+                        'been moved; name the set with --set')
+    models = (folder or load_model_folder(model)).models
+    return SimpleNamespace(
+        name=results['dataset'], place='its bags', models={m.name: m for m in models},
+        scenes=[BagScene(bag) for bag in bags.values()], views=_answered_views)
+
+
+def _answered_views(bag, entry):
+    """Return the DepthViews of the frame set that was answered, the bag's first if unknown."""
+    images = entry.get('images')
+    known = isinstance(images, dict) and all(
+        isinstance(images.get(camera.name), int) for camera in bag.cameras)
+    return bag.views(images if known else None)
+
+
+def _named(base, entry, key):
+    """Return the path that an entry names relative to `base`, None where nothing is there."""
+    path = entry.get(key)
+    if not isinstance(path, str) or '\0' in path or not (base / path).exists():
+        return None
+    return base / path

@@ -39,30 +39,59 @@ def add_arguments(parser):
 
 def run(args):
     """Run the command; return the exit code."""
+    from hooc_perception.cli.categories import warn_of_gap
+    from hooc_perception.cli.failures import tell_failures
+    from hooc_perception.cli.places import relative_place
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.replay.bag_reader import BagScene
     from hooc_perception.scenes.results import scene_result, write_results
     if not args.timeout > 0:
         raise HoocError(f'--timeout is {args.timeout:g}; give the seconds that a scene may take')
+    check_places(args)
     model = load_model_folder(args.model)
     bags = [BagScene(path) for path in bag_paths(args.bags)]
+    check_bags(bags, args.record)
+    classes = [m.name for m in model.models]
+    for bag in bags:
+        if bag.info['categories']:
+            warn_of_gap(classes, bag.info['categories'], bag.path)
+    answers, failures, profile, seed = play(bags, args, model)
+    done = [bag for bag in bags if bag.name in answers]
+    entries = [scene_result(
+        bag.name, answer.parsed, classes, answer.seconds, images=answer.images,
+        bag=relative_place(bag.path, args.out), **bag.world)
+        for bag, answer in ((bag, answers[bag.name]) for bag in done)]
+    if done:
+        write_results(args.out, done[0].info['dataset'], entries, profile=profile, seed=seed,
+                      model=relative_place(args.model, args.out))
+        found = sum(len(entry['objects']) for entry in entries)
+        print(f'{args.out}: {found} objects in {len(entries)} '
+              f'scene{"s" if len(entries) != 1 else ""}')
+        if args.report:
+            write_report(args.report, done, answers, entries, model, profile, seed)
+    return tell_failures(failures)
+
+
+def check_places(args):
+    """Raise HoocError where --out, --report or --record cannot be written."""
+    from hooc_perception.cli.places import file_place, folder_place, page_place
+    file_place(args.out, '--out')
+    page_place(args.report, '--report')
+    folder_place(args.record, '--record')
+
+
+def check_bags(bags, record):
+    """Raise HoocError where bags cannot be used: better before anything starts."""
     names = [bag.name for bag in bags]
     for bag in bags:
         if names.count(bag.name) > 1:
             raise HoocError(f'two bags hold the scene {bag.name!r}; run them one at a time')
+        if record and (record / bag.name).exists():
+            raise HoocError(f'--record {record / bag.name} exists already; remove it or choose '
+                            'another folder')
         if bag.incomplete:
             print(f'warning: {bag.incomplete}', file=sys.stderr)
-        bag.views()     # a bag that cannot be used is better refused before anything starts
-    answers, profile, seed = play(bags, args, model)
-    classes = [m.name for m in model.models]
-    entries = [scene_result(bag.name, answer.parsed, classes, answer.seconds, **bag.world)
-               for bag, answer in zip(bags, answers)]
-    write_results(args.out, bags[0].info['dataset'], entries, profile=profile, seed=seed)
-    found = sum(len(entry['objects']) for entry in entries)
-    print(f'{args.out}: {found} objects in {len(entries)} '
-          f'scene{"s" if len(entries) != 1 else ""}')
-    if args.report:
-        write_report(args.report, bags, answers, entries, model, profile, seed)
+        bag.views()
 
 
 def bag_paths(given):
@@ -110,7 +139,12 @@ def model_defaults(model):
 
 
 def play(bags, args, model):
-    """Return ([Answer of every bag], profile, seed); the last two as the nodes have them."""
+    """
+    Play all bags through the nodes.
+
+    :return: ({scene: Answer}, {scene: HoocError}, profile, seed); the last two as the nodes
+        have them.
+    """
     from hooc_perception.supervisor.bags import BagRunner, LISTENERS, MATCH_TIMEOUT_S
     from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
     from tqdm import tqdm
@@ -121,14 +155,30 @@ def play(bags, args, model):
     # Each bag is a scene of its own, whatever stood there in the last one.
     parameters['parsing_node'].update(track_ttl_s=0.0)
     parameters[REPLAY] = {'wait_for_subscribers': LISTENERS, 'match_timeout_s': MATCH_TIMEOUT_S}
-    answers = []
     with Supervisor((*CHAIN, REPLAY), parameters, isolated=True, verbose=args.verbose,
                     params_file=args.params, defaults=model_defaults(model)) as supervisor:
         runner = BagRunner(supervisor, args.timeout, getattr(args, 'record', None))
-        for bag in tqdm(bags, desc='scenes', unit='scene', disable=None):
-            answers.append(runner.play(bag))
         used = supervisor.get_parameters(CHAIN[-1], ('profile', 'seed'))
-    return answers, used['profile'], used['seed']
+        done = play_all(runner, tqdm(bags, desc='scenes', unit='scene', disable=None))
+    return *done, used['profile'], used['seed']
+
+
+def play_all(runner, bags):
+    """Return ({scene: Answer}, {scene: HoocError}); a scene that fails ends with itself."""
+    answers, failures, over = {}, {}, None
+    for bag in bags:
+        if over:
+            failures[bag.name] = HoocError(f'it was not played, for the nodes had failed ({over})')
+            continue
+        try:
+            answers[bag.name] = runner.play(bag)
+        except HoocError as error:
+            failures[bag.name] = error
+            try:
+                runner.start_over()
+            except HoocError as trouble:
+                over = trouble
+    return answers, failures
 
 
 def write_report(folder, bags, answers, entries, model, profile, seed):
@@ -136,9 +186,10 @@ def write_report(folder, bags, answers, entries, model, profile, seed):
     from hooc_perception.evaluation.report.page import write_report as write_page
     from hooc_perception.evaluation.report.scene import report_scene
     models = {m.name: m for m in model.models}
-    scenes = [report_scene(entry, bag.views(), models, bag.truth,
+    scenes = [report_scene(entry, bag.views(answer.images), models, bag.truth,
                            probabilities=answer.probabilities, pool=answer.parsed.pool)
-              for entry, bag, answer in zip(entries, bags, answers)]
+              for entry, bag, answer in (
+                  (entry, bag, answers[bag.name]) for entry, bag in zip(entries, bags))]
     path = write_page(folder, scenes, f'What stands on the table: {bags[0].info["dataset"]}',
                       [f'Profile {profile}, seed {seed}, through the nodes'])
     print(path)

@@ -26,12 +26,14 @@ def add_arguments(parser):
 
 def run(args):
     """Train and say where the model is."""
+    from hooc_perception.cli.places import folder_place
     from hooc_perception.errors import HoocError
     from hooc_perception.executor import executor
     from hooc_perception.scenes.scene_set import load_scene_set
     from hooc_perception.training.train import train
     if args.seed < 0 or args.jobs < 0:
         raise HoocError('--seed and --jobs must not be negative')
+    folder_place(args.out, '--out')
     start = time.monotonic()
     scene_set = load_scene_set(args.set, with_scenes=False)
     with executor(args.executor):

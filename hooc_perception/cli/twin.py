@@ -30,10 +30,12 @@ def add_arguments(parser):
 
 def run(args):
     """Write the set."""
+    from hooc_perception.cli.places import folder_place
     from hooc_perception.executor import executor
     from hooc_perception.synthesis.twin import TwinOptions, write_twin
     if args.jobs < 0:
         raise HoocError('--jobs must not be negative')
+    folder_place(args.out, '--out')
     options = TwinOptions(tuple(args.scene), args.cameras, args.repeat, args.strength)
     with executor(args.executor):
         print(write_twin(args.out, args.seed, options, progress=True, jobs=args.jobs or -1))

@@ -52,7 +52,7 @@ def rectify(view, config=ObserveConfig()):
     depth edges. Depth along the optical axis does not change under undistortion.
 
     :param view: DepthView, `depth` (H, W) float32 metres with NaN = none.
-    :return: RectifiedView whose camera has no distortion.
+    :return: RectifiedView whose camera has neither distortion nor skew.
     :raises HoocError: where the image and its calibration disagree in size.
     """
     camera = view.camera
@@ -66,8 +66,10 @@ def rectify(view, config=ObserveConfig()):
     d[:len(camera.D)] = camera.D[:8]
     depth = rectify_nearest(depth, np.ascontiguousarray(camera.K, np.float64), d)
     depth[~(depth <= config.max_depth_m) | (depth <= 0)] = np.nan
+    K = camera.K.copy()
+    K[0, 1] = 0
     # The pose goes to other processes as a quaternion and must mean the same there.
-    return RectifiedView(replace(camera, D=np.zeros(len(camera.D)),
+    return RectifiedView(replace(camera, K=K, D=np.zeros(len(camera.D)),
                                  T_world_camera=canonical_pose(camera.T_world_camera)), depth)
 
 

@@ -17,6 +17,8 @@ import numpy as np
 NEAREST_M = 0.05
 FEW = 0.02
 FARTHEST_CAMERA_M = 10.0
+# Share of the focal length; what has more is a matrix whose numbers are in another order.
+MAX_SKEW = 0.05
 # A table is believed from so many readings on (of every STRIDE-th row and column).
 STRIDE, TABLE_READINGS = 4, 100
 
@@ -94,6 +96,14 @@ def table_trouble(view, band_m, radius_m):
     most = heights[1][heights[0].argmax()] + 0.01
     return (f'it measures no table at z = 0 of the target frame (most readings lie at z = '
             f'{most:.2f} m); check its extrinsics, and that z = 0 is the table top')
+
+
+def skew_trouble(K):
+    """Say where a camera matrix (3, 3) has a skew that no sensor has, else return None."""
+    if abs(K[0, 1]) <= MAX_SKEW * K[0, 0]:
+        return None
+    return (f'a skew of {K[0, 1]:g} pixels, more than {MAX_SKEW:g} of the focal length; '
+            'check the order of its numbers or calibrate again')
 
 
 def rig_trouble(cameras, trained, shift_m=0.1, turn_deg=10.0):

@@ -213,6 +213,12 @@ def check_synchrony(stamps):
     """
     if len(stamps) < 2 or not all(stamps.values()):
         return
+    ends = {name: max(values) for name, values in stamps.items()}
+    last, first = max(ends, key=ends.get), min(ends, key=ends.get)
+    if ends[last] - ends[first] > MAX_SPREAD_S:
+        yield Finding(WARNING, first, f'its images end {ends[last] - ends[first]:.3g} s before '
+                      f'those of {last}, so what comes after is in no frame set; look whether '
+                      'the camera or the recorder failed')
     reference_name, reference = min(stamps.items(), key=lambda item: len(item[1]))
     reference = np.array(reference)
     whole = np.ones(len(reference), bool)

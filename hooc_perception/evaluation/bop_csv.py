@@ -2,14 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Export results in the CSV format of the BOP challenge: scene_id,im_id,obj_id,score,R,t,time."""
 
-import io
-from pathlib import Path
 import re
 
 from hooc_perception.core.geometry import inverse, matrix_from_pose
 from hooc_perception.evaluation.matching import in_frame_of, posed
-import numpy as np
-import trimesh
+from hooc_perception.models.mesh import mesh_box
+from hooc_perception.scenes.files import write_atomically
 
 _OBJECT = re.compile(r'obj_(\d+)\Z')
 _SCENE = re.compile(r'(\d{6})(?:_(\d{6}))?\Z')
@@ -28,7 +26,8 @@ def write_bop_csv(path, results, scene_set):
     :param results: content of a results file.
     """
     rows = ['scene_id,im_id,obj_id,score,R,t,time']
-    centres, numbers = _centres(scene_set), _object_ids(scene_set)
+    numbers = _object_ids(scene_set)
+    centres = {c.name: mesh_box(c.mesh_path, c.scale)[0] for c in scene_set.categories}
     entries = {entry['scene']: entry for entry in results['scenes']}
     for index, scene in enumerate(scene_set.scenes):
         entry = entries.get(scene.name)
@@ -48,21 +47,8 @@ def write_bop_csv(path, results, scene_set):
                     str(numbers[thing.category]), f'{thing.score:.6f}',
                     ' '.join(f'{x:.9f}' for x in T[:3, :3].ravel()),
                     ' '.join(f'{1000 * x:.6f}' for x in t), f'{entry["seconds"]:.6f}']))
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text('\n'.join(rows) + '\n')
+    write_atomically(path, '\n'.join(rows) + '\n')
     return len(rows) - 1
-
-
-def _centres(scene_set):
-    """Return {category: (3,) metres}: the bounding box's centre in the mesh file."""
-    out = {}
-    for category in scene_set.categories:
-        file = io.BytesIO(category.mesh_path.read_bytes())
-        mesh = trimesh.load(file, file_type=category.mesh_path.suffix.lstrip('.').lower(),
-                            force='mesh', process=False)
-        out[category.name] = np.asarray(mesh.bounds).mean(0) * category.scale
-    return out
 
 
 def _object_ids(scene_set):

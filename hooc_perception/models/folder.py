@@ -79,15 +79,10 @@ def save_model_folder(path, name, models, classifier, profile, seed, cameras, ma
         a topic, or an array is no numbers.
     """
     path = Path(path)
-    if path.exists() and not (path / 'model.json').is_file() and not (
-            path.is_dir() and not any(path.iterdir())):
-        raise HoocError(f'{path} exists and is not a model folder; name another one')
-    names = [model.name for model in models]
-    for item in [*names, *classifier]:
+    check_place(path, [model.name for model in models])
+    for item in classifier:
         _check_name(item, path)
-    if len({n.lower() for n in names}) != len(names):
-        raise HoocError(f'two categories of {path} have the same name; rename one')
-    check_categories(names, path)
+    check_categories([model.name for model in models], path)
     path.parent.mkdir(parents=True, exist_ok=True)
     building = Path(tempfile.mkdtemp(prefix=f'.{path.name}-', dir=path.parent))
     try:
@@ -103,6 +98,25 @@ def save_model_folder(path, name, models, classifier, profile, seed, cameras, ma
     finally:
         shutil.rmtree(building, ignore_errors=True)
     return load_model_folder(path)
+
+
+def check_place(path, names):
+    """
+    Raise HoocError where no MODEL folder of these categories can be written at `path`.
+
+    Training asks before it begins.
+    """
+    path = Path(path)
+    if path.exists() and not (path / 'model.json').is_file() and not (
+            path.is_dir() and not any(path.iterdir())):
+        raise HoocError(f'{path} exists and is not a model folder; name another one')
+    seen = {}
+    for name in names:
+        _check_name(name, path)
+        if name.lower() in seen:
+            raise HoocError(f'the categories {seen[name.lower()]!r} and {name!r} would share a '
+                            f'file in {path} on systems that take no notice of case; rename one')
+        seen[name.lower()] = name
 
 
 def load_model_folder(path):

@@ -38,6 +38,23 @@ def load_mesh(path, scale=1.0):
     :raises HoocError: the file is missing, empty, too large, not a mesh, has vertices that are
         not finite, no extent along an axis, or an implausible size.
     """
+    mesh = _cleaned(path, scale)
+    mesh.apply_translation(-mesh.bounds.mean(axis=0))
+    return mesh
+
+
+def mesh_box(path, scale=1.0):
+    """
+    Return (centre (3,), size (3,)) in metres of a file's mesh, where the file has it.
+
+    :raises HoocError: as `load_mesh`.
+    """
+    mesh = _cleaned(path, scale)
+    return mesh.bounds.mean(axis=0), np.array(mesh.extents)
+
+
+def _cleaned(path, scale):
+    """Return the mesh of a file, in metres and where the file has it."""
     path = Path(path)
     if isinstance(scale, bool) or not isinstance(scale, (int, float)) or not (
             math.isfinite(scale) and scale > 0):
@@ -67,7 +84,6 @@ def load_mesh(path, scale=1.0):
     if len(mesh.faces) == 0 or mesh.extents.min() < MIN_SIDE_M:
         raise HoocError(f'mesh {path} has no extent along one of its axes; give it some '
                         'thickness')
-    mesh.apply_translation(-mesh.bounds.mean(axis=0))
     return mesh
 
 

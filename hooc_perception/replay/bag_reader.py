@@ -10,7 +10,6 @@ a table's, it is estimated from the depth.
 
 from dataclasses import replace
 from functools import cached_property
-import json
 from pathlib import Path
 
 from hooc_perception.core.depth_encodings import decode_depth, decode_image
@@ -23,8 +22,7 @@ from hooc_perception.replay.camera_topics import (
     depth_topics,
 )
 from hooc_perception.replay.frames import FrameTree, plain
-from hooc_perception.scenes import camera_files, files
-from hooc_perception.scenes.scene import TrueObject
+from hooc_perception.replay.scene_info import default_info, parsed_info, SUFFIX
 from hooc_perception.scenes.support_plane import estimate_table_frame
 import numpy as np
 
@@ -33,7 +31,6 @@ __all__ = ['BagMessage', 'BagScene', 'BagTopic', 'iter_messages', 'topics']
 TABLE_FRAME = 'table'
 TRANSFORM = 'geometry_msgs/msg/TransformStamped'
 TF = 'tf2_msgs/msg/TFMessage'
-INFO_SUFFIX = '/scene_info'
 
 
 class BagScene:
@@ -108,32 +105,24 @@ class BagScene:
     @property
     def truth(self):
         """Return the tuple of TrueObject, None where the bag holds none."""
-        entries = self.info['truth']
-        if entries is None:
-            return None
-        where = f'{self.path}: scene_info truth'
-        result = []
-        for i, entry in enumerate(files.sequence(entries, where)):
-            at = f'{where}[{i}]'
-            translation, rotation = camera_files.pose(entry, at)
-            result.append(TrueObject(
-                files.name(files.required(entry, 'category', at), f'{at} category'), translation,
-                rotation, files.numbers(files.required(entry, 'size', at), 3, f'{at} size'),
-                entry.get('surface_visibility')))
-        return tuple(result)
+        return self.info['truth']
 
-    def views(self):
+    def views(self, images=None):
         """
-        Return the tuple of DepthView of the first frame set, in camera order.
+        Return the tuple of DepthView of one frame set, in camera order.
 
-        That is the first moment when every camera has an image; each one's nearest counts.
-
+        :param images: {camera: which of its images, from 0 on}; an image without a reading
+            stands for the next one. None takes the first moment when every camera has an image;
+            each one's nearest counts.
         :raises HoocError: where an image is damaged or holds no reading.
         """
+        chosen = self._source_views if images is None else self._views_of(images)
         return tuple(replace(view, camera=camera)
-                     for view, camera in zip(self._source_views, self.cameras))
+                     for view, camera in zip(chosen, self.cameras))
 
-    depth = views
+    def depth(self):
+        """Return the tuple of DepthView of the first frame set."""
+        return self.views()
 
     def labels(self):
         """Return {camera: (H, W) uint8 instance labels}, None where the bag holds none."""
@@ -169,6 +158,24 @@ class BagScene:
         return tuple(self._view(camera, topic, nearest[topic][1])
                      for camera, topic in zip(self._source_cameras, names))
 
+    def _views_of(self, images):
+        """Return the DepthViews of images that are counted by camera, cameras as in the bag."""
+        cameras = {self.depth_topics[camera.name]: camera for camera in self._source_cameras}
+        left = {topic: images[camera.name] for topic, camera in cameras.items()}
+        views = {}
+        for message in iter_messages(self.path, set(left)):
+            topic = message.topic.name
+            left[topic] -= 1
+            if left[topic] >= 0 or topic in views:
+                continue
+            try:
+                views[topic] = self._view(cameras[topic], topic, message.read(self.path))
+            except HoocError:
+                continue        # ingestion has dropped it, too
+            if len(views) == len(cameras):
+                return tuple(views[topic] for topic in cameras)
+        raise HoocError(f'{self.path}: it holds no such frame set')
+
     def _view(self, camera, topic, image):
         """Return the DepthView of an image message."""
         try:
@@ -190,23 +197,21 @@ class BagScene:
         wanted = {topic.name for topic in self.topics.values() if topic.type_name in (
             'sensor_msgs/msg/CameraInfo', TRANSFORM, TF) and topic.name != '/tf'}
         wanted |= {name for name, topic in self.topics.items()
-                   if name.endswith(INFO_SUFFIX) and topic.type_name == 'std_msgs/msg/String'}
+                   if name.endswith(SUFFIX) and topic.type_name == 'std_msgs/msg/String'}
         tree, infos, info = FrameTree(), {}, {}
         for message in iter_messages(self.path, wanted):
             topic = message.topic
             if topic.type_name == 'sensor_msgs/msg/CameraInfo':
                 if topic.name not in infos:
                     infos[topic.name] = message.read(self.path)
-            elif topic.name.endswith(INFO_SUFFIX):
-                info = _parsed(message.read(self.path).data, f'{self.path}: {topic.name}')
+            elif topic.name.endswith(SUFFIX):
+                info = parsed_info(message.read(self.path).data, f'{self.path}: {topic.name}')
             else:
                 content = message.read(self.path)
                 for stamped in getattr(content, 'transforms', None) or [content]:
                     tree.add(stamped, f'{self.path}: {topic.name}')
         self._firsts = self._first_images()
-        defaults = {'dataset': self.path.stem, 'scene': self.path.stem, 'categories': [],
-                    'max_instances': 0, 'truth': None, 'world_frame': None}
-        return tree, infos, {**defaults, **info}, self._firsts
+        return tree, infos, {**default_info(self.path.resolve().stem), **info}, self._firsts
 
     def _first_images(self):
         """Return {topic: its first Image message}."""
@@ -223,7 +228,7 @@ class BagScene:
 
     def _in_camera_order(self, found):
         """Return {camera: topic} in the order of scene_info; keep only those images."""
-        order = self.info.get('cameras') or []
+        order = self.info['cameras']
         found = dict(sorted(found.items(), key=lambda item: (
             order.index(item[0]) if item[0] in order else len(order), item[0])))
         self._firsts = {topic: self._firsts[topic] for topic in found.values()}
@@ -258,11 +263,3 @@ class BagScene:
 def _stamp_ns(header):
     """Return a header's stamp in nanoseconds."""
     return header.stamp.sec * 10 ** 9 + header.stamp.nanosec
-
-
-def _parsed(text, where):
-    """Return the mapping of a scene_info message."""
-    try:
-        return files.mapping(json.loads(text), where)
-    except json.JSONDecodeError:
-        raise HoocError(f'{where} is not valid JSON; convert the scene again') from None

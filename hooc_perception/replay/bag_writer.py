@@ -148,10 +148,11 @@ def _image(data, shape, encoding, step, camera_name):
 
 
 def _camera_info(camera):
-    """Return the CameraInfo of a Camera: raw, so K and D; the rectified image keeps K."""
+    """Return the CameraInfo of a Camera: raw, so K and D; the rectified image keeps K but for skew."""
     types = TYPES.types
     P = np.zeros((3, 4))
     P[:, :3] = camera.K
+    P[0, 1] = 0
     return types[CAMERA_INFO](
         header=_header(optical_frame(camera.name)), height=camera.height, width=camera.width,
         distortion_model=camera.distortion_model, d=np.asarray(camera.D, np.float64),

@@ -14,6 +14,7 @@ from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose, PoseArray, TransformStamped
 from hooc_perception.core.depth_encodings import decode_depth, decode_image, METRES
 from hooc_perception.core.geometry import canonical_pose, matrix_from_pose
+from hooc_perception.core.plausible import skew_trouble
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -123,6 +124,8 @@ def camera_from_messages(name, info, transform):
     if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0 and K[2, 2] == 1):
         raise HoocError(f'camera_info of {name} holds no calibration (K = {info.k.tolist()}); '
                         'calibrate the camera or point its driver to the calibration file')
+    if trouble := skew_trouble(K):
+        raise HoocError(f'camera_info of {name} has {trouble}')
     if info.width == 0 or info.height == 0:
         raise HoocError(f'camera_info of {name} says {info.width} x {info.height} pixels; the '
                         'driver has to fill width and height')

@@ -14,7 +14,9 @@ from hooc_perception.core.geometry import inverse, pose_from_matrix
 from hooc_perception.core.names import check_categories
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
+from hooc_perception.models.mesh import mesh_box
 from hooc_perception.scenes import camera_files, files, png
+from hooc_perception.scenes.nominal_table import nominal_cameras
 from hooc_perception.scenes.scene import Category, Scene, TrueObject
 import numpy as np
 
@@ -33,28 +35,33 @@ def is_bop(path):
 
 def load_bop(path, with_scenes=True):
     """
-    Return (name, categories, scenes) of a BOP dataset's test split.
+    Return (name, categories, cameras, scenes) of a BOP dataset's test split.
 
     Category names are those in models_info.json where it has any, else obj_000001 and so on.
+    The cameras are those of the first scene.
 
-    :param with_scenes: False gives the first scene only, for its cameras.
+    :param with_scenes: False opens nothing of the scenes but scene_camera.json; their cameras
+        then stand above a nominal table, and there are no scenes.
     :raises HoocError: one sentence that names file, field and mend.
     """
     models = next(path / folder for folder in _MODEL_FOLDERS if (path / folder).is_dir())
     info_file = models / 'models_info.json'
-    info = files.read_json(info_file)
+    info = files.read_json(info_file) if info_file.is_file() else {}
     categories = _categories(models, info_file, info)
+    name = files.name(path.resolve().name, f'{path}: its name')
+    boxes = _Boxes(categories, info_file, info)
     split = _splits(path)[0]
     scenes = []
     for folder in sorted(p for p in split.iterdir() if p.is_dir() and _SCENE.match(p.name)):
-        scenes += _scenes(folder, categories, info_file, info)
-        if scenes and not with_scenes:
-            break
+        if with_scenes:
+            scenes += _scenes(folder, categories, boxes)
+        elif groups := _groups(folder):
+            cameras = nominal_cameras([_camera(path, folder, *shot) for shot in groups[0][1]])
+            return name, tuple(categories.values()), cameras, ()
     if not scenes:
         raise HoocError(f'{split}: there is no scene with images; add the folders 000001 and so '
                         'on, each with scene_camera.json and depth/')
-    return files.name(path.resolve().name, f'{path}: its name'), tuple(categories.values()), \
-        tuple(scenes)
+    return name, tuple(categories.values()), scenes[0].cameras, tuple(scenes)
 
 
 def _splits(path):
@@ -80,53 +87,75 @@ def _categories(models, info_file, info):
     return result
 
 
-def _scenes(folder, categories, info_file, info):
-    """Return the list of Scenes that one BOP scene folder holds."""
-    camera_file, truth_file = folder / 'scene_camera.json', folder / 'scene_gt.json'
-    shots = files.read_json(camera_file)
-    truths = files.read_json(truth_file) if truth_file.is_file() else {}
+def _groups(folder):
+    """Return [(scene name, [(image id, entry of scene_camera.json, camera name)])]."""
+    file = folder / 'scene_camera.json'
+    shots = files.read_json(file)
     for key in shots:
         if not key.isdecimal():
-            raise HoocError(f'{camera_file}: the image id {files.shown(key)} is not a number; '
+            raise HoocError(f'{file}: the image id {files.shown(key)} is not a number; '
                             'correct it')
-    shared, scenes = [], []
+    shared, groups = [], []
     for key in sorted(shots, key=int):
-        shot = files.mapping(shots[key], f'{camera_file}: {key}')
+        shot = files.mapping(shots[key], f'{file}: {key}')
         if 'cam_R_w2c' in shot and 'cam_t_w2c' in shot:
-            shared.append(key)
-            continue
-        camera, file, unit = _shot(folder, key, shot, 'camera')
-        scenes.append(Scene(f'{folder.name}_{int(key):06d}', (camera,), (file,), (unit,),
-                            _truth(truths, [key], [camera], truth_file, categories, info_file,
-                                   info), table_known=False))
+            shared.append((key, shot, f'view_{int(key):06d}'))
+        else:
+            groups.append((f'{folder.name}_{int(key):06d}', [(key, shot, 'camera')]))
     if shared:
         picks = np.unique(np.linspace(0, len(shared) - 1, min(len(shared), MAX_VIEWS)).round())
-        shared = [shared[int(i)] for i in picks]
-        cameras, depth_files, units = zip(*(
-            _shot(folder, key, shots[key], f'view_{int(key):06d}') for key in shared))
-        truth = _truth(truths, shared, cameras, truth_file, categories, info_file, info)
-        scenes.insert(0, Scene(folder.name, cameras, depth_files, units, truth,
-                               table_known=False))
+        groups.insert(0, (folder.name, [shared[int(i)] for i in picks]))
+    return groups
+
+
+def _scenes(folder, categories, boxes):
+    """Return the list of Scenes that one BOP scene folder holds."""
+    truth_file = folder / 'scene_gt.json'
+    truths = files.read_json(truth_file) if truth_file.is_file() else {}
+    scenes = []
+    for name, shots in _groups(folder):
+        cameras, depth_files, units = zip(*(_shot(folder, *shot) for shot in shots))
+        truth = _truth(truths, [key for key, _, _ in shots], cameras, truth_file, categories,
+                       boxes)
+        scenes.append(Scene(name, cameras, depth_files, units, truth, table_known=False))
     return scenes
+
+
+def _camera(path, folder, key, shot, name):
+    """Return the Camera in the source world without a look at its image."""
+    where = f'{folder / "scene_camera.json"}: {key}'
+    file = path / 'camera.json'
+    entry = files.read_json(file) if file.is_file() else {}
+    K = files.numbers(files.required(shot, 'cam_K', where), 9, f'{where} cam_K')
+    # Who does not say how large the images are has their centre near the middle.
+    width, height = (
+        files.whole(entry[side], 1, files.MAX_SIDE, f'{file}: {side}') if side in entry
+        else int(np.clip(2 * centre + 1, 1, files.MAX_SIDE).round())
+        for side, centre in (('width', K[2]), ('height', K[5])))
+    return _posed_camera(shot, name, width, height, where)
 
 
 def _shot(folder, key, shot, name):
     """Return (Camera in the source world, depth file, metres per count) of one image."""
     where = f'{folder / "scene_camera.json"}: {key}'
     file = folder / 'depth' / f'{int(key):06d}.png'
-    width, height = png.png_size(file)
-    K = camera_files.intrinsics(files.required(shot, 'cam_K', where), width, height,
-                                f'{where} cam_K')
     scale = files.number(shot.get('depth_scale', 1.0), f'{where} depth_scale')
     if not 1e-3 <= scale <= 100:
         raise HoocError(f'{where} depth_scale is {scale:g}; give the millimetres of one count')
+    return _posed_camera(shot, name, *png.png_size(file), where), file, scale * MM
+
+
+def _posed_camera(shot, name, width, height, where):
+    """Return the Camera of an entry of scene_camera.json."""
+    K = camera_files.intrinsics(files.required(shot, 'cam_K', where), width, height,
+                                f'{where} cam_K')
     T_camera_world = np.eye(4)
     if 'cam_R_w2c' in shot:
         T_camera_world = _pose(shot, 'cam_R_w2c', 'cam_t_w2c', where)
-    return Camera(name, width, height, K, np.zeros(5), inverse(T_camera_world)), file, scale * MM
+    return Camera(name, width, height, K, np.zeros(5), inverse(T_camera_world))
 
 
-def _truth(truths, keys, cameras, file, categories, info_file, info):
+def _truth(truths, keys, cameras, file, categories, boxes):
     """Return the tuple of TrueObject in the source world, None where nobody annotated."""
     annotated = [i for i, key in enumerate(keys) if key in truths]
     if not annotated:
@@ -142,7 +171,7 @@ def _truth(truths, keys, cameras, file, categories, info_file, info):
             raise HoocError(f'{where} obj_id is {files.shown(obj_id)}, but no file models/obj_'
                             '<6 digits>.ply has this id; add the model or correct the id')
         T_camera_model = _pose(item, 'cam_R_m2c', 'cam_t_m2c', where)
-        centre, size = _box(info, obj_id, info_file)
+        centre, size = boxes.of(obj_id)
         T_model_centre = np.eye(4)
         T_model_centre[:3, 3] = centre
         translation, rotation = pose_from_matrix(
@@ -164,6 +193,21 @@ def _pose(entry, rotation_key, translation_key, where):
     T[:3, 3] = MM * files.numbers(files.required(entry, translation_key, where), 3,
                                   f'{where} {translation_key}')
     return T
+
+
+class _Boxes:
+    """Bounding boxes of the models: from models_info.json, or from the meshes without it."""
+
+    def __init__(self, categories, info_file, info):
+        self._categories, self._file, self._info = categories, info_file, info
+        self._known = {}
+
+    def of(self, obj_id):
+        """Return (centre (3,), size (3,)) in metres."""
+        if obj_id not in self._known:
+            self._known[obj_id] = (_box(self._info, obj_id, self._file) if self._info else
+                                   mesh_box(self._categories[obj_id].mesh_path, MM))
+        return self._known[obj_id]
 
 
 def _box(info, obj_id, info_file):

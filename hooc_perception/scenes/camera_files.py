@@ -3,6 +3,7 @@
 """Read and write cameras.yaml: intrinsics, lens distortion and pose of every camera."""
 
 from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
+from hooc_perception.core.plausible import skew_trouble
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.scenes import files
@@ -13,8 +14,6 @@ import yaml
 COEFFICIENTS = {'plumb_bob': (4, 5), 'rational_polynomial': (8,)}
 # A quaternion typed with three decimals is off by less; one that was never normalised is not.
 QUATERNION_TOLERANCE = 1e-3
-# Pixels by which the skewed axis may move a point at the image's border before it matters.
-MAX_SKEW_PIXELS = 0.5
 
 
 def load_cameras(path):
@@ -64,15 +63,17 @@ def rotation(value, where):
 
 
 def intrinsics(value, width, height, where):
-    """Return the (3, 3) camera matrix of nine row-major numbers, checked to be usable."""
+    """
+    Return the (3, 3) camera matrix of nine row-major numbers, checked to be usable.
+
+    A skew is kept: `core.observe.rectify` takes it out with the lens distortion.
+    """
     K = files.numbers(value, 9, where).reshape(3, 3)
     if K[0, 0] <= 0 or K[1, 1] <= 0 or K[1, 0] or any(K[2] != (0, 0, 1)):
         raise HoocError(f'{where} is singular or no camera matrix; '
                         'give [fx, 0, cx, 0, fy, cy, 0, 0, 1] with fx, fy > 0')
-    if abs(K[0, 1] / K[1, 1]) * height / 2 > MAX_SKEW_PIXELS:
-        raise HoocError(f'{where} has a skew of {K[0, 1]:g}, which is not supported; '
-                        'calibrate again without skew')
-    K[0, 1] = 0
+    if trouble := skew_trouble(K):
+        raise HoocError(f'{where} has {trouble}')
     if not (-width < K[0, 2] < 2 * width and -height < K[1, 2] < 2 * height):
         raise HoocError(f'{where} has its centre ({K[0, 2]:g}, {K[1, 2]:g}) far outside of the '
                         f'{width} x {height} image; give pixels, row by row')
@@ -80,11 +81,14 @@ def intrinsics(value, width, height, where):
 
 
 def distortion(value, model, where):
-    """Return the coefficients, padded to the model's full length."""
+    """Return the coefficients, padded or cut (of zeros) to the model's full length."""
     if model not in COEFFICIENTS:
         raise HoocError(f'{where} distortion_model is {files.shown(model)}; '
                         f'use one of {", ".join(COEFFICIENTS)}')
     D = files.numbers(value, None, f'{where} D')
+    if len(D) > COEFFICIENTS[model][-1] and not D[COEFFICIENTS[model][-1]:].any():
+        # OpenCV writes 8, 12 or 14 numbers for one and the same lens.
+        D = D[:COEFFICIENTS[model][-1]]
     if len(D) not in (0, *COEFFICIENTS[model]):
         wanted = ' or '.join(map(str, COEFFICIENTS[model]))
         raise HoocError(f'{where} D has {len(D)} numbers; {model} takes {wanted}')

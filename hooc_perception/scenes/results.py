@@ -68,6 +68,27 @@ def load_results(path):
     return content
 
 
+def scenes_in_common(results, names, results_path, place):
+    """
+    Return ({scene: entry} of the scenes that a set holds, what the others are in words or '').
+
+    :param results: content of a results file; `names`: the set's scenes.
+    :param place: names the set in the error.
+    :raises HoocError: where there is no scene in common.
+    """
+    entries = {entry['scene']: entry for entry in results['scenes']}
+    common = {name: entry for name, entry in entries.items() if name in names}
+    if not common:
+        raise HoocError(f'{results_path} and {place} have no scene in common; '
+                        'give the set that the results are of')
+    others = [name for name in entries if name not in names]
+    if not others:
+        return common, ''
+    return common, (f'{"scene" if len(others) == 1 else "scenes"} {", ".join(others[:5])}'
+                    f'{" and more" if len(others) > 5 else ""} '
+                    f'{"is" if len(others) == 1 else "are"}')
+
+
 def _check(content, path):
     """Raise HoocError where a results file breaks the format."""
     if files.required(content, 'format', f'{path}:') != FORMAT:

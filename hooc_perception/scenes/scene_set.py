@@ -10,12 +10,13 @@ from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.scenes import camera_files, files
 from hooc_perception.scenes.bop import is_bop, load_bop
+from hooc_perception.scenes.nominal_table import nominal_cameras
 from hooc_perception.scenes.scene import Category, Scene, TrueObject
+from hooc_perception.scenes.truth import true_object
 from hooc_perception.scenes.writer import FORMAT, NewScene, write_scene_set
 
 # Class ids and instance labels travel as 8-bit images in which 0 is the background.
 MAX_CATEGORIES = 255
-MAX_METRES = 1000.0
 # The world_frame of sets whose poses are not in a table's frame.
 UNKNOWN_WORLD = 'unknown'
 
@@ -57,10 +58,10 @@ class SceneSet:
         raise HoocError(f'{self.path}: there is no scene {name!r}; choose one of {known}')
 
     def selected(self, names):
-        """Return a set with these scenes only, in this order (all where `names` is empty)."""
+        """Return a set with these scenes only, each once, in this order (no `names`: all)."""
         if not names:
             return self
-        return replace(self, scenes=tuple(self.scene(name) for name in names))
+        return replace(self, scenes=tuple(self.scene(name) for name in dict.fromkeys(names)))
 
 
 def load_scene_set(path, with_scenes=True):
@@ -68,7 +69,8 @@ def load_scene_set(path, with_scenes=True):
     Return the SceneSet of a `hooc-scenes/1` folder or of a BOP dataset, whichever it is.
 
     :param with_scenes: False reads models and cameras only, as training must; the set's
-        `scenes` are empty then.
+        `scenes` are empty then, and where the table is not known it is a nominal one
+        (nominal_table.py), for nothing but camera files is opened.
     :raises HoocError: one sentence that names file, field and mend. Depth images are looked
         at no sooner than their scene's `depth()` is called.
     """
@@ -76,10 +78,8 @@ def load_scene_set(path, with_scenes=True):
     if not path.is_dir():
         raise HoocError(f'{path}: there is no such folder; give a scene set or a BOP dataset')
     if not (path / 'dataset.yaml').is_file() and is_bop(path):
-        name, categories, scenes = load_bop(path, with_scenes)
-        cameras = scenes[0].cameras
-        return SceneSet(path, name, 'table', categories, cameras, 0,
-                        scenes if with_scenes else ())
+        name, categories, cameras, scenes = load_bop(path, with_scenes)
+        return SceneSet(path, name, 'table', categories, cameras, 0, scenes)
     return _load_hooc(path, with_scenes)
 
 
@@ -107,17 +107,18 @@ def _load_hooc(path, with_scenes):
     set_cameras = camera_files.load_cameras(known) if known.is_file() else {}
     world = files.name(entry.get('world_frame', 'table'), f'{file}: world_frame')
     own = bool(set_cameras) and world != UNKNOWN_WORLD
-    folders = _scene_folders(path, needed=with_scenes or not own)
+    folders = _scene_folders(path, needed=with_scenes or not set_cameras)
     scenes = tuple(_scene(folder, camera_names, set_cameras, unit, categories, world, path)
                    for folder in (folders if with_scenes else ()))
     if own:
         cameras = _chosen(camera_names, set_cameras, known, file)
-    elif world != UNKNOWN_WORLD:
-        cameras = _scene_cameras(folders[0], camera_names, {}, path)
+    elif with_scenes:
+        cameras = scenes[0].cameras
+    elif set_cameras:
+        cameras = nominal_cameras(_chosen(camera_names, set_cameras, known, file))
     else:
-        # Where the cameras stand above the table, only a scene's depth can tell.
-        cameras = _scene(folders[0], camera_names, set_cameras, unit, categories, world,
-                         path).cameras
+        cameras = _scene_cameras(folders[0], camera_names, {}, path)
+        cameras = nominal_cameras(cameras) if world == UNKNOWN_WORLD else cameras
     return SceneSet(path, files.name(entry.get('name', path.resolve().name), f'{file}: name'),
                     'table' if world == UNKNOWN_WORLD else world, categories, cameras, limit,
                     scenes)
@@ -200,27 +201,5 @@ def _truth(file, categories):
     known = {category.name for category in categories}
     objects = files.read_yaml(file)
     objects = files.sequence(files.required(objects, 'objects', f'{file}:'), f'{file}: objects')
-    return tuple(_true_object(item, f'{file}: objects[{i}]', known)
+    return tuple(true_object(item, f'{file}: objects[{i}]', known)
                  for i, item in enumerate(objects))
-
-
-def _true_object(item, where, known):
-    """Return one TrueObject; `where` names file and row."""
-    item = files.mapping(item, where)
-    category = files.required(item, 'category', f'{where}:')
-    if not isinstance(category, str) or category not in known:
-        raise HoocError(f'{where} category is {files.shown(category)}, which is not in '
-                        'dataset.yaml; add it there or correct the name')
-    where = f'{where} ({category})'
-    translation, rotation = camera_files.pose(item, where)
-    if abs(translation).max() > MAX_METRES:
-        raise HoocError(f'{where} translation is {translation.tolist()}; give metres')
-    size = files.numbers(files.required(item, 'size', where), 3, f'{where} size')
-    if size.min() <= 0 or size.max() > MAX_METRES:
-        raise HoocError(f'{where} size is {size.tolist()}; give three positive lengths in metres')
-    visibility = item.get('surface_visibility')
-    if visibility is not None:
-        visibility = files.number(visibility, f'{where} surface_visibility')
-        if not 0 <= visibility <= 1:
-            raise HoocError(f'{where} surface_visibility is {visibility:g}; give a share 0 to 1')
-    return TrueObject(category, translation, rotation, size, visibility)

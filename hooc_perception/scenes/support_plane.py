@@ -106,6 +106,8 @@ def _points(views):
             continue
         z = depth[::step, ::step][rows, cols].astype(np.float64)
         pixels = np.stack([cols, rows], -1).astype(np.float64) * step
+        # OpenCV knows no skew.
+        pixels[:, 0] -= camera.K[0, 1] * (pixels[:, 1] - camera.K[1, 2]) / camera.K[1, 1]
         rays = cv2.undistortPoints(pixels[:, None], camera.K, camera.D)[:, 0]
         points.append(transform(camera.T_world_camera,
                                 np.column_stack([rays * z[:, None], z])))

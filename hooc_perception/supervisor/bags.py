@@ -60,6 +60,11 @@ class BagRunner:
         supervisor.bring_down([REPLAY])
         return answer
 
+    def start_over(self):
+        """Bring all nodes down after a scene that failed; HoocError where one has died."""
+        self._rig = None
+        self._supervisor.bring_down()
+
     def _listen(self, bag, began):
         """Return the Answer once the bag is played and the chain has answered."""
         supervisor, collector = self._supervisor, self._collector
@@ -69,19 +74,35 @@ class BagRunner:
         if collector.replay['state'] == 'failed':
             supervisor.wait_a_moment()
             raise HoocError(supervisor.processes[REPLAY].last_words())
-        self._wait(lambda: len(collector.stamps) == len(bag.cameras), began, 10.0,
+        self._wait(lambda: all(collector.heard.values()), began, 10.0,
                    f'{bag.name}: not every camera of the bag was heard')
         return self._wait(
-            lambda: collector.answer(min(collector.stamps.values())), began, self._timeout_s,
+            lambda: self._final(bag, began), began, self._timeout_s,
             f'{bag.name}: no objects came within {self._timeout_s:g} s of the last image; '
             'give it more time with --timeout, or a faster profile')
+
+    def _final(self, bag, began):
+        """Return the Answer to the last frame set once no newer one can come, else None."""
+        collector = self._collector
+        # A set with the last image of the camera that fell silent first is the last one.
+        answer = collector.answer(min(stamps[-1] for stamps in collector.heard.values()))
+        if answer or not collector.idle:
+            return answer
+        answer = collector.newest_answer()
+        refused, given_up = collector.complaints(began)
+        if answer and (given_up or collector.sent is None or answer.stamp_ns >= collector.sent):
+            return answer
+        if collector.sent is None:
+            raise HoocError(refused[0] if refused else (
+                f'{bag.name}: no moment is seen by all of its cameras; hooc doctor says more'))
+        return None
 
     def _set_up(self, bag):
         """Bring the chain up for the bag's rig, anew where it differs from the last one."""
         info = bag.info
         rig = {'cameras': tuple(camera.name for camera in bag.cameras),
                'target_frame': info['world_frame'] or 'table'}
-        limit = int(info['max_instances'])
+        limit = info['max_instances']
         if (rig, limit) == self._rig:
             return
         if self._rig is not None:
@@ -95,13 +116,13 @@ class BagRunner:
         self._rig = rig, limit
 
     def _wait(self, condition, began_ns, timeout_s, complaint):
-        """Wait, but no longer once a node reports an error."""
+        """Wait, but no longer once a node gives up a frame set and there is no answer yet."""
         def settled():
             value = condition()
             if not value:
-                for when, sentence in self._collector.errors:
-                    if when > began_ns:
-                        raise HoocError(sentence)
+                _, given_up = self._collector.complaints(began_ns)
+                if given_up and not self._collector.newest_answer():
+                    raise HoocError(given_up[0])
             return value
         return self._supervisor.wait(settled, timeout_s, complaint)
 

@@ -27,14 +27,17 @@ class Answer:
     :ivar seconds: from the last depth image's arrival to the objects' publication.
     :ivar parsed: its pool holds the first proposals, not those of later rounds.
     :ivar probabilities: PixelProbabilities, None if they were not heard.
+    :ivar images: {camera: which of its images, from 0 on} the frame set is made of.
     """
 
     stamp_ns: int
     parsed: ParsedScene
     seconds: float
     probabilities: PixelProbabilities | None
+    images: dict
 
 
+_INGESTION = 'ingestion_node: '
 _PARTS = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
           'scene/summary': String, 'candidates/poses': PoseArray,
           'candidates/attributes': PointCloud2, 'pixels/probabilities': PointCloud2}
@@ -49,7 +52,7 @@ class Collector:
 
     def __init__(self, node):
         """Subscribe to all but the cameras."""
-        self._node, self._images = node, []
+        self._node, self._images, self.sent = node, [], None
         for topic, kind in _PARTS.items():
             node.create_subscription(kind, topic, self._taker(topic), qos(topic))
         node.create_subscription(String, 'replay/status', self._on_status, qos('replay/status'))
@@ -62,8 +65,10 @@ class Collector:
             self._node.destroy_subscription(subscription)
         self._parts = {topic: {} for topic in _PARTS}
         self._published = {}        # stamp -> ns of the publication of objects/poses
-        self.stamps = {}            # camera -> stamp of its latest image
+        self.heard = {camera: [] for camera in cameras}     # stamps of its images
         self._arrived = {}          # stamp of an image -> ns of its latest arrival
+        self._before, self.sent = self.sent, None   # stamp of ingestion's latest frame set
+        self._reports = 0           # of ingestion since the last news
         self.replay, self.errors = {}, []
         self._images = [self._node.create_subscription(
             Image, f'{camera}/depth/image_raw', self._image_taker(camera),
@@ -72,7 +77,8 @@ class Collector:
     def _image_taker(self, camera):
         def take(message, info):
             stamp = nanoseconds(message.header.stamp)
-            self.stamps[camera] = stamp
+            self.heard[camera].append(stamp)
+            self._reports = 0
             self._arrived[stamp] = max(self._arrived.get(stamp, 0), info['received_timestamp'])
         return take
 
@@ -88,16 +94,46 @@ class Collector:
                 del self._parts[topic][min(self._parts[topic])]
             if topic == 'objects/poses':
                 self._published[stamp] = info['source_timestamp']
+                self._reports = 0
         return take
 
     def _on_status(self, message):
         self.replay = json.loads(message.data)
+        self._reports = 0
 
     def _on_diagnostics(self, message):
+        stamp = nanoseconds(message.header.stamp)
+        self._reports += any(s.name.startswith(_INGESTION) for s in message.status)
         for status in message.status:
             if status.level == DiagnosticStatus.ERROR:
-                self.errors.append((nanoseconds(message.header.stamp),
-                                    f'{status.name}: {status.message}'))
+                self.errors.append((stamp, f'{status.name}: {status.message}'))
+            for value in status.values if status.name == f'{_INGESTION}views' else ():
+                # Until it sends again it reports the last set of the last bag.
+                if value.key == 'stamp_ns' and int(value.value) != self._before:
+                    self.sent = int(value.value)
+
+    @property
+    def idle(self):
+        """
+        Say whether ingestion has nothing left to send: it has reported twice since the last news.
+
+        Between two reports it has been given all that had arrived.
+        """
+        return self._reports >= 2
+
+    def complaints(self, since_ns):
+        """
+        Return ([sentence] of ingestion, [sentence] of the other nodes), errors since a time.
+
+        What ingestion refuses costs one image; the others then have given up a frame set.
+        """
+        sentences = [sentence for when, sentence in self.errors if when > since_ns]
+        own = [sentence for sentence in sentences if sentence.startswith(_INGESTION)]
+        return own, [sentence for sentence in sentences if sentence not in own]
+
+    def newest_answer(self):
+        """Return the Answer to the newest frame set that has one, None where none has."""
+        return next(filter(None, map(self.answer, sorted(self._published, reverse=True))), None)
 
     def answer(self, stamp_ns):
         """Return the Answer to the frame set of a stamp, None while parts are missing."""
@@ -119,7 +155,13 @@ class Collector:
         probabilities = self._parts['pixels/probabilities'].get(stamp_ns)
         arrived = max((t for s, t in self._arrived.items() if s >= stamp_ns), default=0)
         return Answer(stamp_ns, parsed, max(0.0, (self._published[stamp_ns] - arrived) * 1e-9),
-                      probabilities and probabilities_from_message(probabilities))
+                      probabilities and probabilities_from_message(probabilities),
+                      self.images_of(stamp_ns))
+
+    def images_of(self, stamp_ns):
+        """Return {camera: which of its images} of a frame set: the first ones not before it."""
+        return {camera: sum(stamp < stamp_ns for stamp in stamps)
+                for camera, stamps in self.heard.items()}
 
     def _pool(self, stamp_ns):
         poses = self._parts['candidates/poses'].get(stamp_ns)

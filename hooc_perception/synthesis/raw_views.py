@@ -79,7 +79,7 @@ class Caster:
             hit = self.scene.cast_rays(o3d.core.Tensor(rays))['t_hit'].numpy()
             in_camera = transform(inverse(camera.T_world_camera), points)
             with np.errstate(divide='ignore', invalid='ignore'):
-                u = camera.K[0, 0] * in_camera[:, 0] / in_camera[:, 2] + camera.K[0, 2]
+                u = in_camera[:, :2] @ camera.K[0, :2] / in_camera[:, 2] + camera.K[0, 2]
                 v = camera.K[1, 1] * in_camera[:, 1] / in_camera[:, 2] + camera.K[1, 2]
             inside = ((in_camera[:, 2] > 0) & (u > -0.5) & (u < camera.width - 0.5)
                       & (v > -0.5) & (v < camera.height - 0.5))

@@ -23,8 +23,10 @@ def look_at(position, target):
 
 
 def undistorted(camera):
-    """Return the camera without lens distortion, as a rectified view has it."""
-    return Camera(camera.name, camera.width, camera.height, np.array(camera.K, float),
+    """Return the camera without lens distortion and skew, as a rectified view has it."""
+    K = np.array(camera.K, float)
+    K[0, 1] = 0
+    return Camera(camera.name, camera.width, camera.height, K,
                   np.zeros(5), np.array(camera.T_world_camera, float))
 
 

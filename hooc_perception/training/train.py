@@ -16,7 +16,7 @@ from hooc_perception.core.config import Config
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.errors import HoocError
 from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import save_model_folder
+from hooc_perception.models.folder import check_place, save_model_folder
 from hooc_perception.models.mesh import load_mesh
 from hooc_perception.synthesis.training_scenes import PAPER, training_scenes
 from hooc_perception.training import fit_pixels
@@ -78,6 +78,7 @@ def train(scene_set, out, profile='best', seed=0, progress=True, configs=None, j
         raise HoocError(f'{scene_set.path} lists no categories; name at least one in dataset.yaml')
     if not scene_set.cameras:
         raise HoocError(f"{scene_set.path} names no cameras; training needs the cameras' layout")
+    check_place(out, [category.name for category in scene_set.categories])
     models = generic_models(scene_set, seed, progress)
     classifier = train_classifier(models, scene_set.cameras, profile, seed,
                                   scene_set.max_instances, configs, jobs, progress)

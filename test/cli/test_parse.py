@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc parse`: results of a small set, and one sentence for every mistake."""
 
+from dataclasses import replace
 import json
 import re
+import shutil
 
 from hooc_perception.cli.main import main
 from hooc_perception.cli.overrides import overrides_of
@@ -186,6 +188,61 @@ def test_true_poses_without_truth_are_refused(scene_set, model, tmp_path, capsys
     said = sentence(capsys)
     assert 'scene unknown has no ground_truth.yaml' in said
     assert '--true-poses' in said
+
+
+def test_a_scene_named_twice_is_parsed_once(scene_set, model, tmp_path):
+    out = tmp_path / 'some.json'
+    assert hooc_parse(scene_set, model, out, *CHEAP, '--scene', 'none', 'none') == 0
+    assert [s['scene'] for s in load_results(out)['scenes']] == ['none']
+
+
+def test_a_broken_scene_does_not_cost_the_others(scene_set, model, tmp_path, capsys):
+    broken = tmp_path / 'set'
+    shutil.copytree(scene_set, broken)
+    (broken / 'scenes' / 'none' / 'left.png').write_bytes(b'no image')
+    out = tmp_path / 'r.json'
+    assert hooc_parse(broken, model, out, *CHEAP) == 1
+    assert [s['scene'] for s in load_results(out)['scenes']] == ['both', 'unknown']
+    assert sentence(capsys).startswith('hooc: scene none: ')
+    assert hooc_parse(broken, model, tmp_path / 'none.json', *CHEAP, '--scene', 'none') == 1
+    assert not (tmp_path / 'none.json').exists()
+
+
+def test_a_place_that_cannot_be_written_is_refused_before_the_work(
+        scene_set, model, tmp_path, capsys, monkeypatch):
+    monkeypatch.setattr(pipeline, 'classify', None)
+    (tmp_path / 'file').touch()
+    assert hooc_parse(scene_set, model, tmp_path) == 1
+    assert f'--out {tmp_path} is a folder; name a file' in sentence(capsys)
+    assert hooc_parse(scene_set, model, tmp_path / 'file' / 'r.json') == 1
+    assert 'is no folder; choose another place' in sentence(capsys)
+
+
+@pytest.fixture
+def other_model(tmp_path, models):
+    """Return a model folder that knows the ball and a cup, but no box."""
+    known = tuple(replace(m, name={'box': 'cup'}.get(m.name, m.name)) for m in models)
+    save_model_folder(tmp_path / 'other', 'other', known, {'nothing': np.zeros(1)}, 'best', 3,
+                      CAMERAS, 1)
+    return tmp_path / 'other'
+
+
+def test_a_model_of_other_categories_is_noticed(annotated, other_model, tmp_path, capsys):
+    out = tmp_path / 'r.json'
+    assert hooc_parse(annotated, other_model, out, *CHEAP, '--true-poses') == 1
+    assert 'it does not know box' in sentence(capsys) and not out.exists()
+    assert hooc_parse(annotated, other_model, out, *CHEAP) == 0
+    said = [line for line in capsys.readouterr().err.splitlines() if line.startswith('[WARN]')]
+    assert len(said) == 1 and 'does not know box' in said[0] and 'does not list cup' in said[0]
+
+
+def test_results_say_where_their_set_is(annotated, model, tmp_path):
+    out = tmp_path / 'deep' / 'r.json'
+    assert hooc_parse(annotated, model, out, *CHEAP, '--scene', 'none') == 0
+    named = json.loads(out.read_text())['set']
+    assert not named.startswith('/') and (out.parent / named).resolve() == annotated.resolve()
+    assert main(['report', str(out), '--out', str(tmp_path / 'r.html')]) == 0
+    assert '>none<' in (tmp_path / 'r.html').read_text()
 
 
 def test_a_set_that_is_not_there(model, tmp_path, capsys):

@@ -1,76 +1,92 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""What `hooc run` and `hooc up` ask of the nodes; the nodes themselves are stand-ins."""
+"""`hooc run` around the nodes: what fails, what is written, what it is refused for."""
 
-from argparse import ArgumentParser
+import json
+from pathlib import Path
 from types import SimpleNamespace
 
-from hooc_perception.cli import run
+from hooc_perception.cli import run as command
+from hooc_perception.cli.main import main
+from hooc_perception.core.types import Candidates, Energy, ParsedScene
 from hooc_perception.errors import HoocError
+from hooc_perception.replay.bag_reader import BagScene
+import numpy as np
 import pytest
 
-pytest.importorskip('rclpy')
-
-from hooc_perception.nodes.ingestion_node import IngestionConfig  # noqa: E402
-from hooc_perception.supervisor import bags, supervisor  # noqa: E402
-
-MODEL = SimpleNamespace(profile='fast', seed=5)
+ROOT = Path(__file__).resolve().parents[2]
+BAG, MODEL = ROOT / 'bags' / 'demo', ROOT / 'models' / 'demo'
 
 
-def arguments(*words):
-    """Return the arguments of `hooc run`."""
-    parser = ArgumentParser()
-    run.add_arguments(parser)
-    return parser.parse_args(['bag', '--model', 'm', '--out', 'r.json', *words])
+class Runner:
+    """A BagRunner without nodes: scenes fail as they are told to."""
+
+    def __init__(self, failing=(), dying=()):
+        self.failing, self.dying, self.played, self.starts = failing, dying, [], 0
+
+    def play(self, bag):
+        self.played.append(bag.name)
+        if bag.name in self.failing or bag.name in self.dying:
+            raise HoocError(f'{bag.name} is too hard')
+        return f'answer to {bag.name}'
+
+    def start_over(self):
+        self.starts += 1
+        if self.played[-1] in self.dying:
+            raise HoocError('parsing_node ended unexpectedly')
+
+
+def bags(*names):
+    return [SimpleNamespace(name=name) for name in names]
+
+
+def test_a_scene_that_fails_ends_with_itself():
+    runner = Runner(failing=('b',))
+    answers, failures = command.play_all(runner, bags('a', 'b', 'c'))
+    assert answers == {'a': 'answer to a', 'c': 'answer to c'}
+    assert list(failures) == ['b'] and runner.starts == 1
+
+
+def test_without_nodes_the_rest_is_not_played():
+    runner = Runner(dying=('b',))
+    answers, failures = command.play_all(runner, bags('a', 'b', 'c'))
+    assert list(answers) == ['a'] and runner.played == ['a', 'b']
+    assert 'too hard' in str(failures['b']) and 'not played' in str(failures['c'])
+    assert 'parsing_node ended unexpectedly' in str(failures['c'])
 
 
 @pytest.fixture
-def started(monkeypatch):
-    """Return the list of what a Supervisor that starts nothing is made with."""
-    seen = []
-
-    class Nodes:
-        def __init__(self, names, parameters, **others):
-            seen.append((parameters, others))
-
-        def __enter__(self):
-            return self
-
-        def __exit__(self, *_):
-            pass
-
-        def get_parameters(self, name, parameters):
-            return {'profile': 'best', 'seed': 7}
-
-    monkeypatch.setattr(supervisor, 'Supervisor', Nodes)
-    monkeypatch.setattr(bags, 'BagRunner', lambda *_: None)
-    return seen
+def answer():
+    """Return an Answer of the bundled scene in which nothing stands."""
+    none = np.zeros(0)
+    parsed = ParsedScene(Candidates.empty(), Energy(0.5, 0.2, 0.0), none, none, none, none,
+                         Candidates.empty())
+    images = {camera.name: 0 for camera in BagScene(BAG).cameras}
+    return SimpleNamespace(parsed=parsed, seconds=1.0, images=images, probabilities=None)
 
 
-@pytest.mark.parametrize('words, given', [
-    ([], {}), (['--seed', '0'], {'seed': 0}),
-    (['--profile', 'best', '--seed', '3'], {'profile': 'best', 'seed': 3})])
-def test_what_is_not_asked_for_is_up_to_the_file_and_then_to_the_model(started, words, given):
-    # The results say what the nodes have worked with.
-    assert run.play([], arguments(*words), MODEL) == ([], 'best', 7)
-    (parameters, others), = started
-    for name in supervisor.CHAIN:
-        assert {k: parameters[name][k] for k in ('profile', 'seed') if k in parameters[name]
-                } == given
-        assert others['defaults'][name] == {'profile': 'fast', 'seed': 5}
+@pytest.mark.skipif(not (BAG / 'metadata.yaml').is_file(), reason='no bundled scene')
+def test_the_finished_scenes_are_written_and_the_others_named(
+        tmp_path, monkeypatch, capsys, answer):
+    monkeypatch.setattr(command, 'play', lambda bags, args, model: (
+        {bags[0].name: answer}, {'other': HoocError('it is too hard')}, 'best', 0))
+    out = tmp_path / 'out' / 'r.json'
+    assert main(['run', str(BAG), '--model', str(MODEL), '--out', str(out)]) == 1
+    assert capsys.readouterr().err.splitlines()[-1] == 'hooc: scene other: it is too hard'
+    results = json.loads(out.read_text())
+    scene, = results['scenes']
+    assert (out.parent / scene['bag']).resolve() == BAG.resolve()
+    assert (out.parent / results['model']).resolve() == MODEL.resolve()
+    # So the report needs neither set nor model.
+    assert main(['report', str(out), '--out', str(tmp_path / 'r.html')]) == 0
+    assert f'>{scene["scene"]}<' in (tmp_path / 'r.html').read_text()
 
 
-@pytest.mark.parametrize('timeout', ['1e9', '601', 'inf', '20'])
-def test_any_timeout_is_one_that_the_nodes_take(started, timeout):
-    run.play([], arguments('--timeout', timeout), MODEL)
-    (parameters, _), = started
-    waits = parameters['ingestion_node']['wait_for_answer_s']
-    IngestionConfig(wait_for_answer_s=waits)
-    assert waits == min(float(timeout), 600)
-
-
-@pytest.mark.parametrize('seed', ['3000000000', '-1'])
-def test_seeds_that_no_node_takes_are_refused_before_one_starts(started, seed):
-    with pytest.raises(HoocError, match='the seed is .* from 0 to 2147483647'):
-        run.play([], arguments('--seed', seed), MODEL)
-    assert not started
+@pytest.mark.skipif(not (BAG / 'metadata.yaml').is_file(), reason='no bundled scene')
+def test_bags_are_looked_at_before_anything_starts(tmp_path):
+    bag = BagScene(BAG)
+    with pytest.raises(HoocError, match='two bags hold the scene'):
+        command.check_bags([bag, bag], None)
+    (tmp_path / bag.name).mkdir()
+    with pytest.raises(HoocError, match='--record .* exists already'):
+        command.check_bags([bag], tmp_path)

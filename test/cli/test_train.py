@@ -21,3 +21,23 @@ def test_a_set_without_any_scene_can_be_trained_on(tmp_path, monkeypatch, capsys
     assert cli.main(['train', str(tmp_path / 'set'), '--out', str(tmp_path / 'm')]) == 0
     assert given['scene_set'].scenes == () and len(given['scene_set'].cameras) == 3
     assert f'{len(CATALOGUE)} categories' in capsys.readouterr().out
+
+
+def sentence(capsys):
+    """Return what the command printed as its one line of error."""
+    line, = capsys.readouterr().err.splitlines()
+    return line
+
+
+def test_what_cannot_be_written_is_refused_before_training(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr('hooc_perception.training.train.generic_models', None)
+    write_catalogue(tmp_path / 'set')
+    (tmp_path / 'full' / 'notes').mkdir(parents=True)
+    assert cli.main(['train', str(tmp_path / 'set'), '--out', str(tmp_path / 'full')]) == 1
+    assert 'exists and is not a model folder' in sentence(capsys)
+    file = tmp_path / 'set' / 'dataset.yaml'
+    first, second = list(CATALOGUE)[:2]
+    file.write_text(file.read_text().replace(f'name: {second},', f'name: {first.upper()},')
+                    .replace(f'name: {second}\n', f'name: {first.upper()}\n'))
+    assert cli.main(['train', str(tmp_path / 'set'), '--out', str(tmp_path / 'm')]) == 1
+    assert f'{first!r} and {first.upper()!r} would share a file' in sentence(capsys)

@@ -3,6 +3,7 @@
 """Undistortion against OpenCV."""
 
 import cv2
+from hooc_perception.core.geometry import back_project
 from hooc_perception.core.kernels.undistort import rectify_nearest
 from hooc_perception.core.observe import ObserveConfig, rectify
 from hooc_perception.core.types import Camera, DepthView
@@ -74,6 +75,20 @@ def test_rectify_uses_it_and_says_that_none_is_left(lens):
     assert not view.camera.D.any()
     np.testing.assert_array_equal(view.camera.K, K)
     np.testing.assert_array_equal(rectify(DepthView(view.camera, view.depth)).depth, view.depth)
+
+
+def test_rectify_takes_the_skew_out():
+    skewed = K + [[0, 8.0, 0], [0, 0, 0], [0, 0, 0]]
+    v, u = np.mgrid[:SHAPE[0], :SHAPE[1]]
+    # A slanted plane: the ray through a raw pixel is inv(K) (u, v, 1).
+    x, y, _ = np.linalg.inv(skewed) @ np.stack([u, v, np.ones_like(u)]).reshape(3, -1)
+    depth = (1 / (1 + 0.3 * x - 0.2 * y)).reshape(SHAPE).astype(np.float32)
+    view = rectify(DepthView(Camera('c', *SHAPE[::-1], skewed, np.zeros(5), np.eye(4)), depth))
+    np.testing.assert_array_equal(view.camera.K, K)
+    points = back_project(view.depth, view.camera)
+    off = points[..., 2] + 0.3 * points[..., 0] - 0.2 * points[..., 1] - 1
+    assert np.nanmax(abs(off)) < 0.002
+    assert np.isfinite(off).mean() > 0.95
 
 
 def test_rectify_takes_impossible_readings_for_none():

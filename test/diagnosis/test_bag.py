@@ -329,3 +329,9 @@ def test_missing_bag_and_exit_codes(sound, tmp_path, capsys):
     assert '0 errors' in capsys.readouterr().out
     assert main(['doctor', str(tmp_path / 'nowhere')]) == 1
     assert 'there is no such bag' in capsys.readouterr().out
+
+
+def test_a_camera_that_ends_before_the_others_is_named(sound, tmp_path):
+    cut = rewritten(sound, tmp_path / 'cut', lambda topic, message, i: (
+        None if i and topic == '/hooc/camera1/depth/image_raw' else message))
+    assert 'camera1: its images end 0.2 s before those of camera0' in found(cut, WARNING)

@@ -85,6 +85,40 @@ def test_report_writes_a_page(tiny_path, truth_file, tmp_path, capsys):
     assert '3 scenes' in capsys.readouterr().out
 
 
+def test_results_of_another_set_are_refused(tiny_path, truth_results, tmp_path, capsys):
+    for scene in truth_results['scenes']:
+        scene['scene'] += '_elsewhere'
+    (tmp_path / 'r.json').write_text(json.dumps(truth_results))
+    assert main(['evaluate', str(tiny_path), str(tmp_path / 'r.json')]) == 1
+    assert 'no scene in common' in capsys.readouterr().err
+
+
+def test_what_is_not_of_the_set_is_said(tiny_path, truth_results, tmp_path, capsys):
+    truth_results['scenes'][0]['scene'] = 'elsewhere'
+    file = tmp_path / 'r.json'
+    file.write_text(json.dumps(truth_results | {'dataset': 'other'}))
+    assert main(['evaluate', str(tiny_path), str(file)]) == 0
+    scenes, dataset = capsys.readouterr().err.splitlines()
+    assert 'scene elsewhere is not in' in scenes and "dataset 'other'" in dataset
+    assert main(['report', str(file), '--set', str(tiny_path), '--out',
+                 str(tmp_path / 'r.html')]) == 0
+    assert 'scene elsewhere is not in' in capsys.readouterr().err
+    # One scene of the set is no results of another set.
+    assert main(['evaluate', str(tiny_path), str(file), '--scene', '10_2']) == 0
+
+
+def test_report_needs_to_know_the_set(truth_file, tiny_path, truth_results, tmp_path, capsys):
+    assert main(['report', str(truth_file), '--out', str(tmp_path / 'r.html')]) == 1
+    assert 'name the set with --set' in capsys.readouterr().err
+    for place in (3, 'gone', 'a\0b'):
+        truth_file.write_text(json.dumps(truth_results | {'set': place}))
+        assert main(['report', str(truth_file), '--out', str(tmp_path / 'r.html')]) == 1
+        assert 'name the set with --set' in capsys.readouterr().err
+    (tmp_path / 'link').symlink_to(tiny_path)
+    truth_file.write_text(json.dumps(truth_results | {'set': 'link'}))
+    assert main(['report', str(truth_file), '--out', str(tmp_path / 'r.html')]) == 0
+
+
 def test_report_of_a_foreign_set_is_refused(tiny_path, truth_results, tmp_path, capsys):
     for scene in truth_results['scenes']:
         scene['scene'] += '_elsewhere'

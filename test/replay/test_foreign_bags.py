@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags that other people recorded, and files that are no bags."""
 
+import json
+
 from hooc_perception.core.geometry import inverse, matrix_from_pose
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera
@@ -261,3 +263,65 @@ def test_no_bag_at_all(tmp_path, name):
         (tmp_path / name).write_text('hello')
     with pytest.raises(HoocError, match=f'{name}: .*;'):
         list(iter_messages(tmp_path / name))
+
+
+STRING = 'std_msgs/msg/String'
+OBJECT = {'category': 'ball', 'translation': [0, 0, 0.1], 'rotation_xyzw': [0, 0, 0, 1],
+          'size': [0.1, 0.1, 0.1]}
+
+
+def bag_of(path, told, depths=(1.0,)):
+    messages = [] if told is None else [('/hooc/scene_info', STRING, M[STRING](json.dumps(told)))]
+    messages.append(('/c/depth/camera_info', INFO, info()))
+    for i, value in enumerate(depths):
+        messages.append(('/c/depth/image_raw', IMAGE, depth_image(
+            np.full((60, 80), value, np.float32), stamp_ns=(i + 1) * 10 ** 9)))
+    return write(path, messages)
+
+
+@pytest.mark.parametrize('told', [
+    {'cameras': 5}, {'cameras': [{'a': 1}]}, {'world_frame': 3}, {'max_instances': 'abc'},
+    {'max_instances': -7}, {'max_instances': 1.5}, {'dataset': 5}, {'scene': 7},
+    {'scene': '../../escaped'}, {'scene': '..'}, {'scene': '/etc/x'}, {'categories': 'ball'},
+    {'truth': 3}, {'truth': [{**OBJECT, 'size': [0, 0, 0]}]},
+    {'truth': [{**OBJECT, 'surface_visibility': 'x'}]},
+    {'truth': [{**OBJECT, 'category': '../x'}]},
+])
+def test_a_key_that_cannot_be_meant_is_named(tmp_path, told):
+    with pytest.raises(HoocError, match=f'/hooc/scene_info {next(iter(told))}'):
+        BagScene(bag_of(tmp_path / 'b', told))
+
+
+def test_absent_keys_and_null_leave_the_choice_to_the_model(tmp_path):
+    for i, told in enumerate((None, {}, {'max_instances': None, 'scene': None, 'dataset': None})):
+        bag = BagScene(bag_of(tmp_path / f'b{i}', told))
+        assert (bag.name, bag.info['dataset'], bag.info['max_instances']) == (f'b{i}', f'b{i}', -1)
+    assert BagScene(bag_of(tmp_path / 'n', {'max_instances': 0})).info['max_instances'] == 0
+
+
+def test_views_of_a_later_frame_set(tmp_path):
+    bag = BagScene(bag_of(tmp_path / 'b', {'world_frame': None}, (1.0, 0.0, 2.0)))
+    bag._table_known = True
+    assert bag.views()[0].depth[0, 0] == 1
+    assert bag.views({'c': 0})[0].depth[0, 0] == 1
+    # The second holds no reading, so no frame set is made of it.
+    assert bag.views({'c': 1})[0].depth[0, 0] == bag.views({'c': 2})[0].depth[0, 0] == 2
+    with pytest.raises(HoocError, match='no such frame set'):
+        bag.views({'c': 3})
+
+
+def test_zeros_behind_the_coefficients_and_a_skew_are_taken_as_live_nodes_take_them(tmp_path):
+    lens, skew = [0.1, -0.2, 0.001, 0.002, 0.01, 0.3, 0.1, 0.02], np.array(K)
+    skew[0, 1] = 2.0
+    for i, (zeros, accepted) in enumerate((([0.0] * 6, True), ([0.0] * 5 + [0.1], False))):
+        bag = write(tmp_path / f'b{i}', [
+            ('/c/depth/camera_info', INFO, info(k=skew, d=lens + zeros,
+                                                model='rational_polynomial')),
+            ('/c/depth/image_raw', IMAGE, depth_image(DEPTH))])
+        if accepted:
+            camera, = BagScene(bag)._source_cameras
+            np.testing.assert_array_equal(camera.D, lens)
+            np.testing.assert_array_equal(camera.K, skew)
+        else:
+            with pytest.raises(HoocError, match='D has 14 numbers'):
+                BagScene(bag)

@@ -97,8 +97,9 @@ def test_rational_polynomial_is_kept():
 
 
 @pytest.mark.parametrize('field, value, word', [
-    ('k', np.zeros(9), 'calibration'), ('width', 0, 'width'),
-    ('distortion_model', 'equidistant', 'plumb_bob'), ('d', [0.1] * 6, '5 finite'),
+    ('k', np.zeros(9), 'calibration'), ('k', [50.0, 9, 25, 0, 50, 20, 0, 0, 1], 'skew'),
+    ('width', 0, 'width'), ('distortion_model', 'equidistant', 'plumb_bob'),
+    ('d', [0.1] * 6, '5 finite'),
     ('d', [np.nan] * 5, 'finite'), ('k', np.full(9, np.inf), 'calibration')])
 def test_bad_calibration_gets_a_sentence(field, value, word):
     camera = a_camera(np.random.default_rng(0), np.zeros(3), [0, 0, 0, 1])

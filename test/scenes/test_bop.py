@@ -125,6 +125,18 @@ def test_poses_come_in_the_table_frame(dataset):
                               + scene.truth[1].translation[:2]) / 2 < 0.05
 
 
+def test_without_models_info_the_meshes_say_it(dataset):
+    told = load_scene_set(dataset)
+    file = dataset / 'models' / 'models_info.json'
+    file.unlink()
+    plain = load_scene_set(dataset)
+    assert plain.category_names == ('obj_000003', 'obj_000007')
+    for a, b in zip(told.scenes, plain.scenes):
+        for one, other in zip(a.truth, b.truth):
+            np.testing.assert_allclose(one.translation, other.translation, atol=1e-6)
+            np.testing.assert_allclose(one.size, other.size, atol=1e-6)
+
+
 def agreement(scene, loaded):
     """Return (object, |measured - rendered| (n,)) where true models are rendered."""
     mesh_of = {c.name: load_mesh(c.mesh_path, c.scale) for c in loaded.categories

@@ -99,6 +99,11 @@ def test_stereo_pair(tmp_path):
     np.testing.assert_allclose(right.T_world_camera[:3, 3], [0.1, 0, 0])
 
 
+def test_skew_is_kept(tmp_path):
+    camera = load_bouguet(written(tmp_path, 'mat', alpha_c=0.01), 'a', '2')
+    assert camera.K[0, 1] == pytest.approx(0.01 * camera.K[0, 0]) and camera.K[0, 1] > 1
+
+
 def test_unit_of_the_board(tmp_path):
     metres = load_bouguet(written(tmp_path, 'm'), 'a', '1', unit=1.0)
     inches = load_bouguet(written(tmp_path, 'm'), 'a', '1', unit=0.0254)

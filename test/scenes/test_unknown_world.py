@@ -30,9 +30,8 @@ def scene(tmp_path_factory):
         world_frame='unknown')
     loaded = load_scene_set(path)
     assert loaded.world_frame == 'table'
-    for cameras in (loaded.cameras, load_scene_set(path, with_scenes=False).cameras):
-        np.testing.assert_array_equal(cameras[0].T_world_camera,
-                                      loaded.scenes[0].cameras[0].T_world_camera)
+    np.testing.assert_array_equal(loaded.cameras[0].T_world_camera,
+                                  loaded.scenes[0].cameras[0].T_world_camera)
     return loaded.scenes[0]
 
 

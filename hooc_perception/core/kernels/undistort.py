@@ -12,7 +12,7 @@ def rectify_nearest(depth, K, d):
     Return the undistorted image: each pixel takes the raw pixel that its ray falls on.
 
     :param depth: (H, W) float32, raw.
-    :param K: (3, 3) float64 of both the raw and the rectified image.
+    :param K: (3, 3) float64 of both the raw and the rectified image, which has no skew.
     :param d: (8,) float64: k1 k2 p1 p2 k3 k4 k5 k6 as in CameraInfo (plumb_bob: k4..k6 = 0).
     :return: (H, W) float32, NaN where the ray leaves the raw image.
     """

@@ -10,6 +10,7 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.shaded import shaded_picture
 from hooc_perception.evaluation.report.space import Meshes, space_json
+from hooc_perception.scenes.files import write_atomically
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 import numpy as np
@@ -49,8 +50,7 @@ def write_report(path, scenes, title='What stands on the table', notes=()):
     path = Path(path)
     if path.suffix.lower() not in ('.html', '.htm'):
         path = path / 'report.html'
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(report_html(scenes, title, notes), encoding='utf-8')
+    write_atomically(path, report_html(scenes, title, notes))
     return path
 
 

@@ -12,5 +12,6 @@ def tell_failures(failures):
     :param failures: {scene: HoocError}.
     """
     for scene, error in failures.items():
-        print(f'hooc: scene {scene}: {error}', file=sys.stderr)
+        text = str(error).removeprefix(f'{scene}: ')
+        print(f'hooc: scene {scene}: {text}', file=sys.stderr)
     return int(bool(failures))

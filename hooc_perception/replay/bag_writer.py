@@ -148,7 +148,7 @@ def _image(data, shape, encoding, step, camera_name):
 
 
 def _camera_info(camera):
-    """Return the CameraInfo of a Camera: raw, so K and D; the rectified image keeps K but for skew."""
+    """Return the CameraInfo of a Camera: raw, so K and D; what P says has no skew."""
     types = TYPES.types
     P = np.zeros((3, 4))
     P[:, :3] = camera.K

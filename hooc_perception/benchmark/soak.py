@@ -29,12 +29,14 @@ from hooc_perception.supervisor.supervisor import CHAIN, Supervisor
 import numpy as np
 import psutil
 from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
 
 # Drop-outs: how often a camera begins one at a frame, and how long it is away, s.
 DROP_OUT, AWAY_S = 0.02, (3.0, 10.0)
 SAMPLE_S = 1.0
-# The first answers compile, load and fill caches; growth counts after this share of the time.
-WARM_UP = 0.3
+# The first answers compile, load and fill caches: growth counts after so many of them, and after
+# this share of the time.
+WARM_ANSWERS, WARM_UP = 8, 0.3
 
 
 @dataclass
@@ -42,31 +44,42 @@ class SoakResult:
     """
     What a soak has shown.
 
-    :ivar seconds: (n,) time of each sample since the first image.
+    :ivar seconds: (n,) time of each sample since the first image; answered: (n,) frame sets
+        that were answered by then.
     :ivar memory_mb: {process: (n,) resident memory, MB}.
     :ivar frames: images published; sets: frame sets that ingestion sent on; answers: those
-        that were answered; deaths: of nodes.
+        that were answered; refused: that a stage refused; deaths: of nodes.
     :ivar reasons: (thing, reason) -> number, as the nodes count them.
     """
 
     seconds: np.ndarray
+    answered: np.ndarray
     memory_mb: dict
     frames: int
     sets: int
     answers: int
+    refused: int
     deaths: int
     reasons: Counter = field(default_factory=Counter)
 
     def growth_mb(self, name):
         """Return by how much a process grew after warming up: last quarter over second."""
-        rows = self.memory_mb[name][int(WARM_UP * len(self.seconds)):]
+        rows = self.memory_mb[name][self._warm():]
         quarter = max(1, len(rows) // 4)
         return float(np.median(rows[-quarter:]) - np.median(rows[:quarter]))
 
     def growth_mb_an_hour(self, name):
         """Return the slope of a line through a process's memory after warming up."""
-        start = int(WARM_UP * len(self.seconds))
+        start = self._warm()
+        if len(self.seconds) - start < 2:
+            return float('nan')
         return float(3600 * np.polyfit(self.seconds[start:], self.memory_mb[name][start:], 1)[0])
+
+    def _warm(self):
+        """Return the sample from which on growth counts, the last one at the latest."""
+        warm = max(int(WARM_UP * len(self.seconds)),
+                   int(np.searchsorted(self.answered, WARM_ANSWERS)))
+        return min(warm, len(self.seconds) - 1)
 
 
 def soak(bag, parameters, seconds, rate=1.0, seed=0, progress=lambda done: None):
@@ -111,10 +124,13 @@ class _Run:
             pose.publish(transform_message(
                 *pose_from_matrix(view.camera.T_world_camera),
                 header(0, scene.info['world_frame'] or 'table'), f'{name}_optical'))
-        self._stamps, self._values, self._reasons = set(), {}, {}
-        self._frames, self._times, self._memory = 0, [], {name: [] for name in CHAIN}
+        self._stamps, self._refused = set(), set()
+        self._values, self._reasons = {}, {}
+        self._frames, self._times, self._answered = 0, [], []
+        self._memory = {name: [] for name in CHAIN}
         node.create_subscription(PoseArray, 'objects/poses', self._on_answer,
                                  qos('objects/poses'))
+        node.create_subscription(Header, 'views/refused', self._on_refused, qos('views/refused'))
         node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 50)
         supervisor.wait(lambda: all(p.get_subscription_count() for _, p, _ in
                                     self._cameras.values()), 30.0, 'nobody listens to the images')
@@ -136,7 +152,8 @@ class _Run:
     def settle(self, timeout_s):
         """Wait until what was sent is answered and counted."""
         deadline = time.monotonic() + timeout_s
-        while time.monotonic() < deadline and len(self._stamps) < self._sets():
+        while time.monotonic() < deadline and (
+                len(self._stamps | self._refused) < self._sets()):
             self._keeper.spin(0.05)
         quiet = time.monotonic() + 2.5      # the counts come once a second
         while time.monotonic() < quiet:
@@ -147,9 +164,10 @@ class _Run:
         if not self._stamps:
             raise HoocError('the nodes gave no answer at all; look at what they log')
         return SoakResult(
-            np.array(self._times), {n: np.array(m) for n, m in self._memory.items()},
-            self._frames, self._sets(), len(self._stamps), sum(self._keeper.deaths.values()),
-            Counter(self._reasons))
+            np.array(self._times), np.array(self._answered),
+            {n: np.array(m) for n, m in self._memory.items()},
+            self._frames, self._sets(), len(self._stamps), len(self._refused - self._stamps),
+            sum(self._keeper.deaths.values()), Counter(self._reasons))
 
     def _sets(self):
         return int(self._values.get(('ingestion_node: views', 'sets'), 0))
@@ -168,6 +186,7 @@ class _Run:
 
     def _sample(self, seconds):
         self._times.append(seconds)
+        self._answered.append(len(self._stamps))
         for name, process in self._supervisor.processes.items():
             try:
                 rss = psutil.Process(process.pid).memory_info().rss
@@ -177,6 +196,9 @@ class _Run:
 
     def _on_answer(self, message):
         self._stamps.add(nanoseconds(message.header.stamp))
+
+    def _on_refused(self, message):
+        self._refused.add(nanoseconds(message.stamp))
 
     def _on_diagnostics(self, message):
         for status in message.status:

@@ -175,7 +175,8 @@ def _soak(args):
     if args.json:
         _write_json(args.json, {
             'format': 'hooc-soak/1', 'minutes': args.soak, 'frames': result.frames,
-            'sets': result.sets, 'answers': result.answers, 'deaths': result.deaths,
+            'sets': result.sets, 'answers': result.answers, 'refused': result.refused,
+            'deaths': result.deaths,
             'seconds': result.seconds.round(1).tolist(),
             'memory_mb': {n: m.round(1).tolist() for n, m in result.memory_mb.items()},
             'reasons': {f'{thing} {reason}': number
@@ -199,7 +200,7 @@ def _print_soak(result, allowed=0.05):
         f'Memory over {result.seconds[-1] / 60:.1f} minutes, MB',
         ('', 'first', 'most', 'last', 'grown', 'an hour'), tuple(rows),
         (f'{result.frames} images, {result.sets} frame sets, {result.answers} answered, '
-         f'{result.deaths} deaths. Counted: {reasons}.',
+         f'{result.refused} refused, {result.deaths} deaths. Counted: {reasons}.',
          'Grown: median of the last quarter over that of the first after warming up.'))))
     return flat
 

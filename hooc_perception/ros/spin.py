@@ -23,7 +23,7 @@ _PR_SET_PDEATHSIG = 1
 
 def run_node(make_node, args=None):
     """
-    Spin the node that `make_node()` returns until a signal; return the exit code.
+    Spin the StageNode that `make_node()` returns until a signal; return the exit code.
 
     An active node is deactivated before it ends, while others still hear it.
 

@@ -159,7 +159,7 @@ def test_the_chain_of_processes_does_not_grow(repository, cheap, monkeypatch, tm
     # Whatever ingestion sent on was answered, or counted: a machine that still compiles beside
     # other work may take longer than ingestion waits.
     late = result.reasons['ingestion_node: chain', 'no_answer']
-    assert result.sets - late <= result.answers <= result.sets
+    assert result.sets - late - result.refused <= result.answers <= result.sets
     grown = {name: result.growth_mb(name) for name in CHAIN}
     assert max(grown.values()) < 40, grown
     write_plot(tmp_path / 'soak.png', result)

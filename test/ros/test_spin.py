@@ -40,6 +40,8 @@ class Node(rclpy.node.Node):
         self.create_timer(0.01, self.say)
     def say(self):
         print('up', flush=True)
+    def leave(self):
+        print('leaves', flush=True)
     def destroy_node(self):
         print('ends', flush=True)
         import time
@@ -68,7 +70,8 @@ def test_signals_end_a_node_quietly_also_when_repeated(number):
                                stderr=subprocess.PIPE, text=True)
     assert process.stdout.readline() == 'up\n'
     process.send_signal(number)
-    assert 'ends\n' in iter(process.stdout.readline, '')
+    assert 'leaves\n' in iter(process.stdout.readline, '')
+    assert process.stdout.readline() == 'ends\n'
     process.send_signal(number)
     _, said = process.communicate(timeout=30)
     assert (process.returncode, said) == (0, '')

@@ -1,13 +1,13 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Assembly of N free-running cameras into frame sets, and the join of what stages publish.
+Assembly of N free-running cameras into frame sets.
 
 Pure Python on integer nanoseconds, so that every order of arrival can be tested. Whatever is
 dropped has a reason, which is counted.
 """
 
-from collections import Counter, OrderedDict
+from collections import Counter
 from dataclasses import dataclass
 
 from hooc_perception.core.config import Config, param
@@ -258,45 +258,3 @@ class FrameSets:
     def _drop(self, camera, reason):
         self.drops[camera, reason] += 1
         return reason
-
-
-class StampJoin:
-    """
-    Bring together the parts that several topics carry for one stamp.
-
-    :param parts: names of all parts of a whole.
-    :param capacity: how many stamps may wait; the oldest makes room.
-    """
-
-    def __init__(self, parts, capacity=16):
-        self.parts, self.capacity = frozenset(parts), capacity
-        self.drops = Counter()          # (missing part, reason) -> number
-        self._waiting = OrderedDict()   # stamp_ns -> {part: value}
-
-    def add(self, part, stamp_ns, value):
-        """
-        Take in one part; return {part: value} once the stamp is whole, else None.
-
-        When a stamp is whole, earlier arrivals that still wait can only be older news and are
-        dropped as `incomplete`, under the name of a part that they lack; so is the first to
-        arrive where more than `capacity` wait.
-        """
-        have = self._waiting.setdefault(stamp_ns, {})
-        have[part] = value
-        if self.parts <= have.keys():
-            for stamp in list(self._waiting):
-                if stamp == stamp_ns:
-                    break
-                self._drop(stamp)
-            return self._waiting.pop(stamp_ns)
-        while len(self._waiting) > self.capacity:
-            self._drop(next(iter(self._waiting)))
-        return None
-
-    def clear(self):
-        """Forget everything that waits."""
-        self._waiting.clear()
-
-    def _drop(self, stamp):
-        have = self._waiting.pop(stamp)
-        self.drops[min(self.parts - have.keys()), 'incomplete'] += 1

@@ -20,8 +20,8 @@ from hooc_perception.ros.conversions import (
     nanoseconds,
     transform_message,
 )
-from hooc_perception.ros.frame_sets import StampJoin
 from hooc_perception.ros.stage_messages import points_message
+from hooc_perception.ros.stamp_join import StampJoin
 from hooc_perception.ros.upstream import Upstream
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2

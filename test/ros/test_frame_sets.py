@@ -6,7 +6,8 @@ from dataclasses import replace
 import itertools
 
 from hooc_perception.errors import HoocError
-from hooc_perception.ros.frame_sets import EXPLAINED, FrameSetConfig, FrameSets, StampJoin
+from hooc_perception.ros.frame_sets import EXPLAINED, FrameSetConfig, FrameSets
+from hooc_perception.ros.stamp_join import StampJoin
 import numpy as np
 import pytest
 

@@ -49,7 +49,7 @@ def played(bundle, tmp_path_factory):
     parameters[REPLAY] = {'wait_for_subscribers': LISTENERS}
     try:
         with Supervisor((*CHAIN, REPLAY), parameters, isolated=True) as supervisor:
-            runner = BagRunner(supervisor, 60.0)
+            runner = BagRunner(supervisor, 240.0)
             first = runner.play(BagScene(bag))
             # No `hooc`, no package of ours: only the environment that says which domain.
             late = subprocess.Popen([sys.executable, '-I', str(HERE / 'late_subscriber.py')],

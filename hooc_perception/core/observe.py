@@ -61,16 +61,26 @@ def rectify(view, config=ObserveConfig()):
             f'the depth image of camera {camera.name} is {view.depth.shape[1]} x '
             f'{view.depth.shape[0]} pixels, but its calibration is for {camera.width} x '
             f'{camera.height}; record both at the same resolution')
-    depth = np.ascontiguousarray(view.depth, np.float32)
-    d = np.zeros(8)
-    d[:len(camera.D)] = camera.D[:8]
-    depth = rectify_nearest(depth, np.ascontiguousarray(camera.K, np.float64), d)
+    depth = _undistorted(view.depth, camera)
     depth[~(depth <= config.max_depth_m) | (depth <= 0)] = np.nan
     K = camera.K.copy()
     K[0, 1] = 0
     # The pose goes to other processes as a quaternion and must mean the same there.
     return RectifiedView(replace(camera, K=K, D=np.zeros(len(camera.D)),
                                  T_world_camera=canonical_pose(camera.T_world_camera)), depth)
+
+
+def rectified_numbers(image, camera):
+    """Return (H, W) uint8 of a raw image moved to where `rectify` moves its depth; else 0."""
+    return np.nan_to_num(_undistorted(image, camera)).astype(np.uint8)
+
+
+def _undistorted(image, camera):
+    """Return (H, W) float32 of a raw image without the lens distortion and skew of its Camera."""
+    d = np.zeros(8)
+    d[:len(camera.D)] = camera.D[:8]
+    return rectify_nearest(np.ascontiguousarray(image, np.float32),
+                           np.ascontiguousarray(camera.K, np.float64), d)
 
 
 def observe(views, config=ObserveConfig()):

@@ -5,11 +5,11 @@
 from dataclasses import dataclass, field
 
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import ObserveConfig, rectify
+from hooc_perception.core.observe import ObserveConfig, rectified_numbers, rectify
 from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.bop import bop_score
-from hooc_perception.evaluation.masks import rectified_labels, score_masks
+from hooc_perception.evaluation.masks import score_masks
 from hooc_perception.evaluation.matching import in_frame_of, posed
 from hooc_perception.evaluation.scores import per_category, score_scene
 from hooc_perception.evaluation.visibility import scene_visibility
@@ -116,7 +116,7 @@ def evaluate_results(scene_set, results, models, label='', visibility=None):
 def _masks(scene, found, models, about):
     """Return the MaskScore of a scene with instance labels."""
     raw = {view.camera.name: view for view in scene.depth()}
-    labels = {name: rectified_labels(image, raw[name].camera)
+    labels = {name: rectified_numbers(image, raw[name].camera)
               for name, image in scene.labels().items()}
     views = [rectify(view, RECTIFY) for view in raw.values()]
     return score_masks(scene.name, found, models, views, labels, **about)

@@ -4,7 +4,6 @@
 
 from dataclasses import dataclass
 
-from hooc_perception.core.kernels.undistort import rectify_nearest
 from hooc_perception.core.render import render_depth
 from hooc_perception.evaluation.errors import world_mesh
 import numpy as np
@@ -32,15 +31,6 @@ class MaskScore:
     iou: tuple
     seconds: float = float('nan')
     missing: bool = False
-
-
-def rectified_labels(labels, camera):
-    """Return labels (H, W) uint8 of the raw image moved to where `rectify` moves its depth."""
-    D = np.zeros(8)
-    D[:len(camera.D)] = camera.D
-    moved = rectify_nearest(np.ascontiguousarray(labels, np.float32),
-                            np.ascontiguousarray(camera.K, np.float64), D)
-    return np.nan_to_num(moved, nan=0.0).astype(np.uint8)
 
 
 def match_masks(estimated_ids, n_estimates, labels, valid):

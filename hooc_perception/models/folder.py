@@ -82,7 +82,6 @@ def save_model_folder(path, name, models, classifier, profile, seed, cameras, ma
     check_place(path, [model.name for model in models])
     for item in classifier:
         _check_name(item, path)
-    check_categories([model.name for model in models], path)
     path.parent.mkdir(parents=True, exist_ok=True)
     building = Path(tempfile.mkdtemp(prefix=f'.{path.name}-', dir=path.parent))
     try:
@@ -117,6 +116,7 @@ def check_place(path, names):
             raise HoocError(f'the categories {seen[name.lower()]!r} and {name!r} would share a '
                             f'file in {path} on systems that take no notice of case; rename one')
         seen[name.lower()] = name
+    check_categories(names, path)
 
 
 def load_model_folder(path):

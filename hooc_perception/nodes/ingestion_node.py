@@ -8,7 +8,7 @@ import time
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.config import param
-from hooc_perception.core.observe import rectify
+from hooc_perception.core.observe import rectified_numbers, rectify
 from hooc_perception.core.plausible import table_trouble
 from hooc_perception.core.types import DepthView, RectifiedView
 from hooc_perception.errors import HoocError
@@ -18,7 +18,7 @@ from hooc_perception.ros.camera_input import CameraInput
 from hooc_perception.ros.camera_poses import PoseParameters, TfPoses
 from hooc_perception.ros.conversions import nanoseconds
 from hooc_perception.ros.frame_sets import EXPLAINED, FrameSetConfig, FrameSets, SILENT
-from hooc_perception.ros.raw_frames import FrameRefused, RawFrames, rectified_count
+from hooc_perception.ros.raw_frames import FrameRefused, RawFrames
 from hooc_perception.ros.spin import run_node
 from hooc_perception.ros.stage_node import StageConfig, StageNode
 from hooc_perception.ros.view_topics import ViewOutput
@@ -179,7 +179,7 @@ class IngestionNode(StageNode):
                 continue
             view, count = self.frames[name].view(frame)
             views.append(rectify(view, self.parameters['observe']))
-            counts.append(count if count is None else rectified_count(count, view.camera))
+            counts.append(count if count is None else rectified_numbers(count, view.camera))
         return views, counts
 
     def tell_of_lost(self):

@@ -69,8 +69,7 @@ class BagScene:
     @property
     def incomplete(self):
         """Say of which cameras the bag holds no depth image, None where there is none."""
-        names = cameras_without_depth(self.topics, self.depth_topics,
-                                      self.info.get('cameras') or [])
+        names = cameras_without_depth(self.topics, self.depth_topics, self.info['cameras'])
         if not names:
             return None
         return (f'{self.path}: there is no depth image of {", ".join(names)}, though the bag '

@@ -70,15 +70,16 @@ class ObjectOutput:
 
     def clear(self, stamp_ns, frame):
         """Take the last answer back: empty messages on every topic, no markers."""
-        head, none = header(stamp_ns, frame), np.zeros((0, 3))
+        head = header(stamp_ns, frame)
+        attributes, unexplained = empty_clouds(head)
         self._labels.publish(String(data=labels_json(self.models, self.meshes)))
-        self._attributes.publish(cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head))
+        self._attributes.publish(attributes)
         for publisher in self._by_category:
             publisher.publish(PoseArray(header=head))
         # What a predecessor that died has left in a viewer goes with DELETEALL.
         self._markers.publish(MarkerArray(markers=[
             *self._deleted(set(), head), Marker(header=head, action=Marker.DELETEALL)]))
-        self._unexplained.publish(points_message(none, head))
+        self._unexplained.publish(unexplained)
         self._summary.publish(String(data=summary_json(None, stamp_ns)))
         self._poses.publish(PoseArray(header=head))
 
@@ -104,6 +105,12 @@ class ObjectOutput:
             marker.color.a = 0.8
             markers.append(marker)
         return MarkerArray(markers=markers)
+
+
+def empty_clouds(head):
+    """Return `objects/attributes` and `scene/unexplained` where nothing is known to stand."""
+    return (cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head),
+            points_message(np.zeros((0, 3)), head))
 
 
 def summary_json(parsed, stamp_ns):

@@ -7,7 +7,6 @@ import textwrap
 
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.core.fuse import Fusion
-from hooc_perception.core.kernels.undistort import rectify_nearest
 from hooc_perception.core.plausible import (
     pose_trouble,
     reading_trouble,
@@ -110,14 +109,6 @@ class RawFrames:
         _refuse('absurd_extrinsics', pose_trouble(camera), f'camera {self.name}: ')
         self._key, self._known = key, camera
         return camera
-
-
-def rectified_count(count, camera):
-    """Return (H, W) uint8 counts of readings where `rectify` puts the readings."""
-    d = np.zeros(8)
-    d[:len(camera.D)] = camera.D[:8]
-    moved = rectify_nearest(count.astype(np.float32), np.ascontiguousarray(camera.K), d)
-    return np.nan_to_num(moved).astype(np.uint8)
 
 
 def _refusing(code, function, *args):

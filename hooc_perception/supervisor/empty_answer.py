@@ -8,10 +8,8 @@ from geometry_msgs.msg import PoseArray
 from hooc_perception.core.types import Candidates, Energy, ParsedScene
 from hooc_perception.ros.adapters.detections import detections_message
 from hooc_perception.ros.found import FoundScene
-from hooc_perception.ros.object_output import summary_json
-from hooc_perception.ros.point_clouds import cloud_message, row_dtype
+from hooc_perception.ros.object_output import empty_clouds, summary_json
 from hooc_perception.ros.qos import qos
-from hooc_perception.ros.stage_messages import OBJECT_COLUMNS, points_message
 from hooc_perception.supervisor.shown import optional_messages
 import numpy as np
 from sensor_msgs.msg import PointCloud2
@@ -61,10 +59,11 @@ class EmptyAnswer:
         """Say that nothing is known to stand in the target frame; `objects/poses` goes last."""
         scene = FoundScene(self._node.get_clock().now().nanoseconds, frame, ())
         head, shown = scene.header, self._shown
+        attributes, unexplained = empty_clouds(head)
         messages = {
-            'objects/attributes': cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head),
+            'objects/attributes': attributes,
             'objects/markers': self._markers_message(head),
-            'scene/unexplained': points_message(np.zeros((0, 3)), head),
+            'scene/unexplained': unexplained,
             'scene/summary': String(data=summary_json(_NOTHING, scene.stamp_ns))}
         if shown.labels is not None:
             messages['objects/labels'] = String(data=json.dumps({**shown.labels, 'objects': {}}))

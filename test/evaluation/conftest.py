@@ -8,6 +8,7 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.evaluate import scoring_models
 from hooc_perception.evaluation.matching import posed
 from hooc_perception.scenes.scene_set import load_scene_set, NewScene, TrueObject, write_scene_set
+from hooc_perception.synthesis.rigs import look_at
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -22,13 +23,8 @@ def looking_at_origin(name, azimuth, distance=0.9, elevation=0.7, width=160, hei
     """Return a Camera on a circle around the table that looks at its middle."""
     eye = distance * np.array([np.cos(azimuth) * np.cos(elevation),
                                np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
-    z = -eye / np.linalg.norm(eye)
-    x = np.cross(z, [0, 0, 1.0])
-    x /= np.linalg.norm(x)
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = np.column_stack([x, np.cross(z, x), z]), eye
     K = np.array([[150.0, 0, 79.5], [0, 150.0, 59.5], [0, 0, 1]])
-    return Camera(name, width, height, K, np.zeros(5), T)
+    return Camera(name, width, height, K, np.zeros(5), look_at(eye, np.zeros(3)))
 
 
 def true_object(category, x, y, z, yaw=0.0, size=None):

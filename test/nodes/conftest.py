@@ -125,15 +125,22 @@ class Stages:
 
 
 @pytest.fixture(scope='session')
-def folder(tmp_path_factory):
-    """Return a MODEL folder of three simple things, seen by one small camera."""
-    rng = np.random.default_rng(0)
-    meshes = {'box': trimesh.creation.box((0.1, 0.06, 0.08)),
-              'ball': trimesh.creation.icosphere(2, 0.05),
-              'can': trimesh.creation.cylinder(0.04, 0.12)}
-    models = [derive(name, mesh, rng, 200, 100) for name, mesh in meshes.items()]
-    return save_model_folder(tmp_path_factory.mktemp('model') / 'm', 'm', models,
-                             {'kind': np.zeros(1)}, 'fast', 3, (overhead_camera(),), 1)
+def make_folder(tmp_path_factory):
+    """Return a function that saves {category: mesh} as a ModelFolder, seen by one camera."""
+    def make(meshes):
+        rng = np.random.default_rng(0)
+        models = [derive(name, mesh, rng, 200, 100) for name, mesh in meshes.items()]
+        return save_model_folder(tmp_path_factory.mktemp('model') / 'm', 'm', models,
+                                 {'kind': np.zeros(1)}, 'fast', 3, (overhead_camera(),), 1)
+    return make
+
+
+@pytest.fixture(scope='session')
+def folder(make_folder):
+    """Return the ModelFolder of three simple things."""
+    return make_folder({'box': trimesh.creation.box((0.1, 0.06, 0.08)),
+                        'ball': trimesh.creation.icosphere(2, 0.05),
+                        'can': trimesh.creation.cylinder(0.04, 0.12)})
 
 
 @pytest.fixture

@@ -9,8 +9,6 @@ import subprocess
 import sys
 from types import SimpleNamespace
 
-from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import save_model_folder
 import numpy as np
 import pytest
 import trimesh
@@ -21,7 +19,7 @@ from geometry_msgs.msg import PoseArray  # noqa: E402
 from hooc_perception.core.observe import observe  # noqa: E402
 from hooc_perception.core.types import Energy, ParsedScene  # noqa: E402
 from hooc_perception.nodes import parsing_node  # noqa: E402
-from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera  # noqa: E402
+from hooc_perception.nodes.warm_up import made_up_scene  # noqa: E402
 from hooc_perception.ros import conversions as c  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
 from hooc_perception.ros.stage_messages import (  # noqa: E402
@@ -86,14 +84,10 @@ class Adapter:
 
 
 @pytest.fixture(scope='module')
-def folder(tmp_path_factory):
-    """Return the ModelFolder of a box and a can, seen by one small camera."""
-    rng = np.random.default_rng(0)
-    meshes = {'box': trimesh.creation.box((0.1, 0.06, 0.08)),
-              'can': trimesh.creation.cylinder(0.04, 0.12)}
-    models = [derive(name, mesh, rng, 200, 100) for name, mesh in meshes.items()]
-    return save_model_folder(tmp_path_factory.mktemp('model') / 'm', 'm', models,
-                             {'kind': np.zeros(1)}, 'fast', 3, (overhead_camera(),), 1)
+def folder(make_folder):
+    """Return the ModelFolder of a box and a can."""
+    return make_folder({'box': trimesh.creation.box((0.1, 0.06, 0.08)),
+                        'can': trimesh.creation.cylinder(0.04, 0.12)})
 
 
 @pytest.fixture

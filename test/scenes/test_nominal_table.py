@@ -11,6 +11,7 @@ from hooc_perception.core.geometry import matrix_from_pose
 from hooc_perception.core.types import Camera
 from hooc_perception.scenes.nominal_table import nominal_cameras
 from hooc_perception.scenes.scene_set import load_scene_set, NewScene, TrueObject, write_scene_set
+from hooc_perception.synthesis.rigs import look_at
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -24,12 +25,7 @@ sys.addaudithook(lambda event, args: opened.append(args[0]) if event == 'open' e
 def looking_at_origin(name, azimuth, elevation=0.7, distance=0.9):
     eye = distance * np.array([np.cos(azimuth) * np.cos(elevation),
                                np.sin(azimuth) * np.cos(elevation), np.sin(elevation)])
-    z = -eye / np.linalg.norm(eye)
-    x = np.cross(z, [0, 0, 1.0])
-    x /= np.linalg.norm(x)
-    T = np.eye(4)
-    T[:3, :3], T[:3, 3] = np.column_stack([x, np.cross(z, x), z]), eye
-    return Camera(name, 80, 60, K, np.zeros(5), T)
+    return Camera(name, 80, 60, K, np.zeros(5), look_at(eye, np.zeros(3)))
 
 
 def moved(cameras, T):

@@ -40,7 +40,8 @@ setup(
     ],
     python_requires='>=3.11',
     install_requires=['setuptools'],
-    extras_require={'test': ['pytest'], 'dask': ['distributed']},
+    extras_require={'test': ['pytest'], 'dask': ['distributed'],
+                    'rerun': ['rerun-sdk==0.41.0']},
     zip_safe=False,
     entry_points={
         'console_scripts': [

@@ -26,15 +26,19 @@ def add_arguments(parser):
                         help='run the chain of --model again, to list the rejected candidates')
     parser.add_argument('--out', metavar='PATH', default='report.html',
                         help='HTML file, or folder for report.html (default: %(default)s)')
+    parser.add_argument('--rerun', metavar='FILE.rrd',
+                        help='also write the scenes as a recording for the Rerun viewer (needs '
+                        'rerun-sdk)')
     parser.add_argument('--scene', metavar='ID', action='append', default=[],
                         help='show this scene only (repeatable)')
 
 
 def run(args):
     """Run the command; return the exit code."""
-    from hooc_perception.cli.places import page_place
+    from hooc_perception.cli.places import file_place, page_place
     from hooc_perception.evaluation.matching import in_frame_of
     from hooc_perception.evaluation.report.page import write_report
+    from hooc_perception.evaluation.report.recording import rerun_sdk, write_recording
     from hooc_perception.evaluation.report.scene import report_scene
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.scenes.results import load_results, scenes_in_common
@@ -44,6 +48,8 @@ def run(args):
         raise HoocError('--candidates runs the chain again and needs a trained model; '
                         'give its folder with --model')
     page_place(args.out, '--out')
+    if file_place(args.rerun, '--rerun'):
+        rerun_sdk()
     folder = load_model_folder(args.model) if args.model else None
     results = load_results(args.results)
     source = _source(args, results, folder)
@@ -65,10 +71,13 @@ def run(args):
         scenes.append(report_scene(entry, views, source.models, scene.truth, **more))
     notes = [f'Set {source.name}' + ''.join(
         f', {key} {results[key]}' for key in ('profile', 'seed', 'setting') if key in results)]
-    path = write_report(args.out, scenes, f'What stands on the table: {results["dataset"]}',
-                        notes)
-    print(f'{path}: {len(scenes)} scene{"s" if len(scenes) != 1 else ""}, '
-          f'{path.stat().st_size / 1e6:.1f} MB')
+    title = f'What stands on the table: {results["dataset"]}'
+    written = [write_report(args.out, scenes, title, notes)]
+    if args.rerun:
+        written.append(write_recording(args.rerun, scenes, title))
+    for path in written:
+        print(f'{path}: {len(scenes)} scene{"s" if len(scenes) != 1 else ""}, '
+              f'{path.stat().st_size / 1e6:.1f} MB')
     return 0
 
 

@@ -5,20 +5,14 @@
 import json
 
 from geometry_msgs.msg import PoseArray
-from hooc_perception.core.types import Candidates, Energy, ParsedScene
 from hooc_perception.ros.adapters.detections import detections_message
 from hooc_perception.ros.found import FoundScene
 from hooc_perception.ros.object_output import empty_clouds, summary_json
 from hooc_perception.ros.qos import qos
 from hooc_perception.supervisor.shown import optional_messages
-import numpy as np
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
-
-_NONE = np.zeros(0)
-_NOTHING = ParsedScene(Candidates.empty(), Energy(0.0, 0.0, 0.0), _NONE, _NONE, _NONE, _NONE,
-                       Candidates.empty(), converged=False)
 
 
 class EmptyAnswer:
@@ -64,7 +58,7 @@ class EmptyAnswer:
             'objects/attributes': attributes,
             'objects/markers': self._markers_message(head),
             'scene/unexplained': unexplained,
-            'scene/summary': String(data=summary_json(_NOTHING, scene.stamp_ns))}
+            'scene/summary': String(data=summary_json(None, scene.stamp_ns))}
         if shown.labels is not None:
             messages['objects/labels'] = String(data=json.dumps({**shown.labels, 'objects': {}}))
         if self._detections:

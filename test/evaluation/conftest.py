@@ -7,6 +7,7 @@ from hooc_perception.core.types import Camera
 from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.evaluate import scoring_models
 from hooc_perception.evaluation.matching import posed
+from hooc_perception.evaluation.report.scene import report_scene
 from hooc_perception.scenes.scene_set import load_scene_set, NewScene, TrueObject, write_scene_set
 from hooc_perception.synthesis.rigs import look_at
 import numpy as np
@@ -99,6 +100,16 @@ def truth_results():
     scenes.append({'scene': 'labelled', 'seconds': 1.0, 'energy': None,
                    'objects': [*map(entry, TRUTHS['10_1'])]})
     return {'format': 'hooc-results/1', 'dataset': 'tiny', 'scenes': scenes}
+
+
+@pytest.fixture
+def scene(tiny, models, truth_results):
+    """Return a ReportScene whose last object is missing, so that its points stay unexplained."""
+    entry = next(e for e in truth_results['scenes'] if e['scene'] == '10_1')
+    entry['objects'].pop()
+    entry['objects'][0] |= {'visible_ratio': 0.8, 'residual_m': 0.004, 'n_views': 2}
+    source = tiny.scene('10_1')
+    return report_scene(entry, source.depth(), models, source.truth)
 
 
 @pytest.fixture

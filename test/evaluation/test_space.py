@@ -27,16 +27,6 @@ def browser_module():
 
 
 @pytest.fixture
-def scene(tiny, models, truth_results):
-    """Return a ReportScene whose last object is missing, so that its points stay unexplained."""
-    entry = next(e for e in truth_results['scenes'] if e['scene'] == '10_1')
-    entry['objects'].pop()
-    entry['objects'][0] |= {'visible_ratio': 0.8, 'residual_m': 0.004, 'n_views': 2}
-    source = tiny.scene('10_1')
-    return report_scene(entry, source.depth(), models, source.truth)
-
-
-@pytest.fixture
 def page(scene, tmp_path):
     return write_report(tmp_path / 'report.html', [scene])
 

@@ -21,6 +21,12 @@ MAX_REJECTED = 80
 TERMS = ('depth', 'probability', 'overlap')
 
 
+def palette_of(scenes):
+    """Return {category: (r, g, b)} of all that ReportScenes know of."""
+    return pictures.colours(sorted({c for s in scenes for c in (
+        *s.models, *(o.category for o in (*s.objects, *(s.truth or ()))))}))
+
+
 def report_html(scenes, title='What stands on the table', notes=()):
     """
     Return the page (str) of a sequence of ReportScene.
@@ -30,9 +36,7 @@ def report_html(scenes, title='What stands on the table', notes=()):
 
     :param notes: sentences below the title, such as the profile and the model's name.
     """
-    names = sorted({c for s in scenes
-                    for c in (*s.models, *(o.category for o in (*s.objects, *(s.truth or ()))))})
-    palette = pictures.colours(names)
+    palette = palette_of(scenes)
     environment = Environment(loader=FileSystemLoader(Path(__file__).parent), autoescape=True,
                               undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     environment.filters['pretty'] = lambda name: str(name).replace('_', ' ')

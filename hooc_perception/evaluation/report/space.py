@@ -81,12 +81,14 @@ def placed(thing, model, store):
     return {'mesh': store.use(model), 'at': [float(x) for x in (*A.T.ravel(), *t)]}
 
 
-def cloud_of(observation, meshes, colours):
+def seen_points(observation, meshes, colours):
     """
-    Return (dict of the points near the objects, (3,) middle of what stands there).
+    Return [(points (n, 3) world, rgb (n, 3) float 0-255)] of three groups of readings.
 
-    The points come in three groups: table, explained (in the colour of their object),
-    unexplained.
+    They are the table, what objects explain (in the colour of their object), and what none
+    explains.
+
+    :param meshes: the objects as they stand, see `world_mesh`; `colours` one (r, g, b) each.
     """
     groups = [[], [], []]
     for view in observation.views:
@@ -103,13 +105,22 @@ def cloud_of(observation, meshes, colours):
             elif k == 2:
                 rgb[:] = UNEXPLAINED_RGB
             groups[k].append((points[mask], rgb * shade[mask][:, None]))
-    table, explained, left = (tuple(np.concatenate(part) for part in zip(*group))
-                              for group in groups)
-    standing = np.concatenate([explained[0], left[0], *(v for v, _ in meshes)])
+    return [tuple(np.concatenate(part) for part in zip(*group)) for group in groups]
+
+
+def extent_of(explained, left, meshes):
+    """Return (low, high) (3,) corners around what stands there, metres in the world."""
+    standing = np.concatenate([explained, left, *(v for v, _ in meshes)])
     standing = standing[np.isfinite(standing).all(1)]
     if not len(standing):
         standing = np.array([[-0.3, -0.3, 0], [0.3, 0.3, 0.2]])
-    low, high = np.percentile(standing, [1, 99], axis=0) + np.array([[-BORDER_M], [BORDER_M]])
+    return np.percentile(standing, [1, 99], axis=0) + np.array([[-BORDER_M], [BORDER_M]])
+
+
+def cloud_of(observation, meshes, colours):
+    """Return (dict of the `seen_points` near the objects, (3,) middle of what stands there)."""
+    table, explained, left = seen_points(observation, meshes, colours)
+    low, high = extent_of(explained[0], left[0], meshes)
     foreground = len(explained[0]) + len(left[0])
     kept = []
     for k, (points, rgb) in enumerate((table, explained, left)):

@@ -1,0 +1,123 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The scenes of a report as a recording for the Rerun viewer (https://rerun.io)."""
+
+import os
+from pathlib import Path
+
+from hooc_perception.errors import HoocError
+from hooc_perception.evaluation.errors import world_mesh
+from hooc_perception.evaluation.report import pictures
+from hooc_perception.evaluation.report.page import palette_of
+from hooc_perception.evaluation.report.space import extent_of, seen_points
+import numpy as np
+
+TIMELINE = 'scene'
+GROUPS = ('table', 'explained', 'unexplained')
+POINT_RADIUS_M = 0.0012
+
+
+def rerun_sdk():
+    """
+    Return the module of the Rerun SDK.
+
+    :raises HoocError: where it is not installed.
+    """
+    try:
+        import rerun
+    except ImportError:
+        raise HoocError('recordings for Rerun need its SDK, which is not part of our set-up; '
+                        'install it with: .venv/bin/pip install rerun-sdk==0.41.0')
+    return rerun
+
+
+def write_recording(path, scenes, title='What stands on the table'):
+    """
+    Write ReportScenes into one .rrd file, each at its number on the timeline `scene`.
+
+    `world/` holds cameras with their depth, the measured points (table, explained,
+    unexplained), `objects/<category>/<k>` with a mesh each and the numbers of the results, and
+    `truth/...` alike, where it is known. World frame and metres, as in the results.
+
+    :param scenes: sequence of ReportScene.
+    :return: the file's Path.
+    :raises HoocError: where the SDK is not installed.
+    """
+    rr, path = rerun_sdk(), Path(path)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_name(f'.{path.name}.{os.getpid()}')
+    recording = rr.RecordingStream(title)
+    try:
+        recording.save(part, default_blueprint=_blueprint(rr, scenes))
+        recording.log('world', rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        palette = palette_of(scenes)
+        for number, scene in enumerate(scenes):
+            recording.set_time(TIMELINE, sequence=number)
+            _log_scene(rr, recording, scene, palette)
+        recording.flush()
+        recording.disconnect()
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+    return path
+
+
+def _blueprint(rr, scenes):
+    """Return what the viewer opens with: the scene in 3D without its truth, the depth images."""
+    import rerun.blueprint as rrb
+    cameras = dict.fromkeys(v.camera.name for s in scenes for v in s.observation.views)
+    space = rrb.Spatial3DView(name='scene', origin='world',
+                              contents=['+ $origin/**', '- $origin/cameras/**',
+                                        '- $origin/truth/**'])
+    images = [rrb.Spatial2DView(name=name, origin=f'world/cameras/{name}') for name in cameras]
+    return rrb.Blueprint(rrb.Horizontal(
+        space, rrb.Vertical(rrb.TextDocumentView(name='name', origin='name'), *images),
+        column_shares=[3, 1]), collapse_panels=True)
+
+
+def _log_scene(rr, recording, scene, palette):
+    """Log one ReportScene at the time that is set; what the one before showed goes."""
+    recording.log('world', rr.Clear(recursive=True))
+    recording.log('name', rr.TextDocument(scene.name))
+    for view in scene.observation.views:
+        _log_camera(rr, recording, view)
+    colours = pictures.instance_colours(scene.objects, palette)
+    drawn = [i for i, o in enumerate(scene.objects) if o.category in scene.models]
+    meshes = [world_mesh(scene.objects[i], scene.models[scene.objects[i].category])
+              for i in drawn]
+    for i, mesh in zip(drawn, meshes):
+        place = _log_mesh(rr, recording, 'objects', i, scene.objects[i], mesh, colours[i])
+        known = scene.evidence[i] if i < len(scene.evidence) else {}
+        facts = {key: value for key, value in known.items() if value is not None}
+        recording.log(place, rr.AnyValues(score=scene.objects[i].score, **facts))
+    groups = seen_points(scene.observation, meshes, [colours[i] for i in drawn])
+    low, high = extent_of(groups[1][0], groups[2][0], meshes)
+    for name, (points, rgb) in zip(GROUPS, groups):
+        near = ((points >= low) & (points <= high)).all(1)
+        recording.log(f'world/points/{name}', rr.Points3D(
+            points[near], colors=rgb[near].clip(0, 255).astype(np.uint8), radii=POINT_RADIUS_M))
+    for i, thing in enumerate(scene.truth or ()):
+        if thing.category in scene.models:
+            _log_mesh(rr, recording, 'truth', i, thing,
+                      world_mesh(thing, scene.models[thing.category]), (255, 255, 255))
+
+
+def _log_camera(rr, recording, view):
+    """Log one ObservedView: where its camera is, its intrinsics and its depth."""
+    place, camera = f'world/cameras/{view.camera.name}', view.camera
+    recording.log(place, rr.Transform3D(translation=camera.T_world_camera[:3, 3],
+                                        mat3x3=camera.T_world_camera[:3, :3]))
+    recording.log(place, rr.Pinhole(image_from_camera=camera.K,
+                                    resolution=[camera.width, camera.height],
+                                    camera_xyz=rr.ViewCoordinates.RDF))
+    recording.log(f'{place}/depth', rr.DepthImage(np.nan_to_num(view.depth), meter=1.0))
+
+
+def _log_mesh(rr, recording, group, number, thing, mesh, colour):
+    """Log a PosedObject's mesh as it stands, with its name at its centre; return its entity."""
+    place = f'world/{group}/{thing.category}/{number}'
+    recording.log(place, rr.Mesh3D(vertex_positions=mesh[0], triangle_indices=mesh[1],
+                                   albedo_factor=[int(c) for c in colour]))
+    recording.log(f'{place}/name', rr.Points3D([thing.translation], labels=[thing.category],
+                                               colors=[int(c) for c in colour], radii=0.003))
+    return place

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 from hooc_perception.evaluation.masks import EXPLAINED_IOU
 from hooc_perception.evaluation.tables import Table
+import numpy as np
 
 ROW = 'ablations'
+RIGHT_RAD = np.radians(15)
 
 
 @dataclass(frozen=True)
@@ -59,7 +61,8 @@ def tables_of(name, best, scores, records):
     full = best and next(r for r in best['results'] if r['setting'] == 'A')
     out = []
     for key, header, figures, verdicts, note in (
-            ('mean', ('found', 'localized', '< 2 cm', 'false'), _posed, _localized, 'localized'),
+            ('mean', ('found', 'localized', '< 2 cm', '< 15 deg', 'false'), _posed, _localized,
+             'localized'),
             ('masks', ('recall', 'precision'), _masked, _explained, 'recall')):
         results = [(s, r) for s, r in shown if key in r]
         if not results:
@@ -86,9 +89,17 @@ def tables_of(name, best, scores, records):
     return out
 
 
+def turned_right(result):
+    """Return the share of the true objects that are localized and turned right, over scenes."""
+    return float(np.mean([
+        np.mean([o['localized'] and o['rotation_rad'] < RIGHT_RAD for o in s['objects']])
+        for s in result['scenes'] if s['objects']]))
+
+
 def _posed(result):
     mean = result['mean']
-    return tuple(mean[c] for c in ('found', 'localized', 'tight', 'false_categories'))
+    return (*(mean[c] for c in ('found', 'localized', 'tight')), turned_right(result),
+            mean['false_categories'])
 
 
 def _masked(result):
@@ -114,7 +125,7 @@ def _exchanged(full, less):
 
 
 def _texts(values):
-    return [f'{v:.1f}' if i == 3 else f'{v:.3f}' for i, v in enumerate(values)]
+    return [f'{v:.1f}' if i == 4 else f'{v:.3f}' for i, v in enumerate(values)]
 
 
 def _seconds(name, row, result, records):

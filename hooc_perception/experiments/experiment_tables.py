@@ -66,11 +66,9 @@ def score_table(scores, seconds):
             mean, bop = result['mean'], result.get('bop') or {}
             placed = [o for s in result['scenes'] for o in s['objects'] if o['localized']]
             degrees = np.degrees([o['rotation_rad'] for o in placed])
-            right = [np.mean([o['localized'] and np.degrees(o['rotation_rad']) < 15
-                              for o in s['objects']]) for s in result['scenes'] if s['objects']]
             rows.append((
                 f'`{row}`', setting, *(_three(mean[c]) for c in ('found', 'localized', 'tight')),
-                _three(float(np.mean(right))),
+                _three(ablations.turned_right(result)),
                 f'{mean["false_categories"]:.1f}',
                 f'{1000 * np.median([o["centre_m"] for o in placed]):.0f}' if placed else None,
                 f'{np.median(degrees):.0f}' if placed else None,

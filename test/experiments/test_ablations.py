@@ -77,13 +77,12 @@ def test_ablations_are_told_against_best(computed, write_scores):
     records = {f'small/{row}/A': run.Record('k', code, 'abc', cpu, 9.0, 10.0) for row, code, cpu in
                (('best', 'c', 7.0), (SWITCHES[0].row, 'c', 5.0), (SWITCHES[2].row, 'c', 4.25))}
     text = page.sections_of(computed, ['small'], records)['small ablations']
-    assert cells(text, '`best`') == [['best', '-', '1.000', '1.000', '1.000', '0.0', '-', '-', '-',
-                                      '7.0']]
+    assert cells(text, '`best`') == [['best', '-', *['1.000'] * 4, '0.0', *'---', '7.0']]
     assert cells(text, SWITCHES[0].name) == [[
-        SWITCHES[0].name, SWITCHES[0].parameters[0], '1.000', '0.500', '0.000', '0.0', '-0.500',
-        '1', '0', '5.0']]
+        SWITCHES[0].name, SWITCHES[0].parameters[0], '1.000', '0.500', '0.000', '0.500', '0.0',
+        '-0.500', '1', '0', '5.0']]
     # The half that rounds to even is told as it is computed.
-    assert cells(text, SWITCHES[2].name)[0][6:] == ['+0.000', '0', '0', '4.2']
+    assert cells(text, SWITCHES[2].name)[0][7:] == ['+0.000', '0', '0', '4.2']
     assert len(text.splitlines()) == 9 and 'other code' not in text and 'same code' not in text
     records[f'small/{SWITCHES[2].row}/A'] = run.Record('k', 'd', 'abd', 4.0, 9.0, 10.0)
     sections = page.sections_of(computed, ['small'], records)
@@ -96,7 +95,7 @@ def test_ablations_without_best_show_no_change(computed, write_scores):
     plan.Layout(computed, 'small').scores('best').unlink()
     text = page.sections_of(computed, ['small'], {})['small ablations']
     assert cells(text, '`best`') == []
-    assert cells(text, SWITCHES[0].name)[0][3:] == ['0.500', '0.000', '0.0', '-', '-', '-', '-']
+    assert cells(text, SWITCHES[0].name)[0][3:] == ['0.500', '0.000', '0.500', '0.0', *'----']
 
 
 def test_ablations_of_labelled_scenes_are_told_by_masks():

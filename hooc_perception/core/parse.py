@@ -34,7 +34,7 @@ class ParseConfig(LocalSearchConfig, GeneticConfig):
                       'next round', low=1)
     finalists: int = param(8, 'joint: candidates a category, beside the chosen, that are looked '
                            'at in full resolution', low=1)
-    rounds: int = param(2, 'joint: rounds of refinement and re-proposal', low=0)
+    rounds: int = param(3, 'joint: rounds of refinement and re-proposal', low=0)
     polish_steps: int = param(20, 'joint: steps of refinement of a chosen object', low=0)
     turn_steps: int = param(10, 'joint: steps of refinement of a chosen object after half a turn '
                             'about each of its axes; 0 = no such turns', low=0)

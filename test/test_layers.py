@@ -27,7 +27,7 @@ ALLOWED = {
     'training': {'numpy', 'scipy', 'numba', 'sklearn', 'joblib', 'tqdm',
                  'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.synthesis'},
     'evaluation': {'numpy', 'scipy', 'yaml', 'cv2', 'PIL', 'sklearn', 'matplotlib', 'jinja2',
-                   'markupsafe', 'pyrender', 'OpenGL', 'trimesh', 'open3d', 'tqdm',
+                   'markupsafe', 'pyrender', 'OpenGL', 'trimesh', 'open3d', 'tqdm', 'rerun',
                    'hooc_perception.core', 'hooc_perception.models', 'hooc_perception.scenes'},
     'ros': {'numpy', 'scipy', 'rclpy', 'hooc_perception.core'},
     'nodes': {'numpy', 'rclpy', 'hooc_perception.core', 'hooc_perception.ros',

@@ -6,6 +6,7 @@ Reading files that somebody else wrote: bounded, checked, and with errors that n
 Every function raises HoocError with one sentence: file, field, mend.
 """
 
+from contextlib import contextmanager
 import json
 import math
 import os
@@ -70,15 +71,22 @@ def read_json(path):
     return mapping(content, f'{path}:')
 
 
-def write_atomically(path, content):
-    """Write a text file so that a reader sees the old content or the new, never a part."""
+@contextmanager
+def written_whole(path):
+    """
+    Give the Path of an empty file to write to, which then takes the place of `path` at once.
+
+    A reader sees the old content or the new, never a part; where writing fails, the old.
+
+    :raises HoocError: where nothing can be written there.
+    """
     path = Path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f'.{path.name}.')
+        os.close(handle)
         try:
-            with os.fdopen(handle, 'w', encoding='utf-8') as file:
-                file.write(content)
+            yield Path(temporary)
             os.chmod(temporary, 0o644)
             os.replace(temporary, path)
         except BaseException:
@@ -87,6 +95,12 @@ def write_atomically(path, content):
     except OSError as error:
         raise HoocError(f'{path}: cannot be written ({error.strerror}); '
                         'choose another place or free some space') from None
+
+
+def write_atomically(path, content):
+    """Write a text file as `written_whole`."""
+    with written_whole(path) as part:
+        part.write_text(content, encoding='utf-8')
 
 
 def mapping(value, where):

@@ -2,7 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scenes of a report as a recording for the Rerun viewer (https://rerun.io)."""
 
-import os
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
@@ -10,6 +9,7 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.page import palette_of
 from hooc_perception.evaluation.report.space import extent_of, seen_points
+from hooc_perception.scenes.files import written_whole
 import numpy as np
 
 TIMELINE = 'scene'
@@ -41,24 +41,19 @@ def write_recording(path, scenes, title='What stands on the table'):
 
     :param scenes: sequence of ReportScene.
     :return: the file's Path.
-    :raises HoocError: where the SDK is not installed.
+    :raises HoocError: where the SDK is not installed, or nothing can be written there.
     """
     rr, path = rerun_sdk(), Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_name(f'.{path.name}.{os.getpid()}')
-    recording = rr.RecordingStream(title)
-    try:
+    palette = palette_of(scenes)
+    with written_whole(path) as part:
+        recording = rr.RecordingStream(title)
         recording.save(part, default_blueprint=_blueprint(rr, scenes))
         recording.log('world', rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-        palette = palette_of(scenes)
         for number, scene in enumerate(scenes):
             recording.set_time(TIMELINE, sequence=number)
             _log_scene(rr, recording, scene, palette)
         recording.flush()
         recording.disconnect()
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
     return path
 
 

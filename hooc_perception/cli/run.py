@@ -145,7 +145,7 @@ def play(bags, args, model):
     :return: ({scene: Answer}, {scene: HoocError}, profile, seed); the last two as the nodes
         have them.
     """
-    from hooc_perception.supervisor.bags import BagRunner, LISTENERS, MATCH_TIMEOUT_S
+    from hooc_perception.supervisor.bags import BagRunner, MATCH_TIMEOUT_S
     from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
     from tqdm import tqdm
     parameters = chain_parameters(args, model)
@@ -154,7 +154,7 @@ def play(bags, args, model):
                                         wait_for_answer_s=min(args.timeout, LONGEST_WAIT_S))
     # Each bag is a scene of its own, whatever stood there in the last one.
     parameters['parsing_node'].update(track_ttl_s=0.0)
-    parameters[REPLAY] = {'wait_for_subscribers': LISTENERS, 'match_timeout_s': MATCH_TIMEOUT_S}
+    parameters[REPLAY] = {'match_timeout_s': MATCH_TIMEOUT_S}
     with Supervisor((*CHAIN, REPLAY), parameters, isolated=True, verbose=args.verbose,
                     params_file=args.params, defaults=model_defaults(model)) as supervisor:
         runner = BagRunner(supervisor, args.timeout, getattr(args, 'record', None))

@@ -12,6 +12,7 @@ import traceback
 from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.diagnostics import Diagnostics, WARN
+from hooc_perception.ros.downstream import wait_for_workers
 from hooc_perception.ros.memory import give_back_memory
 from hooc_perception.ros.misaddressed import misaddressed
 from hooc_perception.ros.parameters import fixed_param, Parameters
@@ -41,6 +42,9 @@ class StageConfig(Config):
                       '', 0, 2 ** 31 - 1)
     warm_up: bool = param(True, 'Try the stage on a made-up scene while configuring, so that the '
                           'first answer does not wait for compiled code.')
+    wait_for_stages: bool = param(
+        False, 'Activating waits, 30 s at most, until the other stages listen to what this one '
+        'publishes: for recordings, of which no frame set comes a second time.')
 
 
 class StageNode(LifecycleNode):
@@ -62,6 +66,7 @@ class StageNode(LifecycleNode):
         self.active = False
         self.since = 0.0            # monotonic seconds of the last activation
         self._mine = []
+        self._topics = {}           # what is published -> its row in the table of topics
         self._before = set(vars(self)) | {'parameters', 'diagnostics'}
         self.parameters = Parameters(self, self.is_unconfigured)
         self.diagnostics = Diagnostics(self)
@@ -105,6 +110,7 @@ class StageNode(LifecycleNode):
         made = self.create_lifecycle_publisher(kind, name or topic, qos(topic),
                                                qos_overriding_options=overridable())
         self._mine.append((self.destroy_lifecycle_publisher, made))
+        self._topics[name or topic] = topic
         return made
 
     def subscription(self, kind, topic, callback, name=None):
@@ -182,6 +188,8 @@ class StageNode(LifecycleNode):
         def start():
             self.since = time.monotonic()
             LifecycleNode.on_activate(self, state)
+            if getattr(self.config, 'wait_for_stages', False):
+                wait_for_workers(self, self._topics)
             self.activate()
             self.active = True
             self.diagnostics.state('node', 'ok', 'ok')
@@ -253,6 +261,7 @@ class StageNode(LifecycleNode):
     def _destroy(self):
         """Destroy the endpoints, forget what was built and give its memory back."""
         self.cleanup()
+        self._topics.clear()
         while self._mine:
             destroy, made = self._mine.pop()
             destroy(made)

@@ -10,7 +10,7 @@ from hooc_perception.supervisor.recorder import Recorder
 from hooc_perception.supervisor.supervisor import CHAIN, REPLAY
 
 MATCH_TIMEOUT_S = 30.0
-# Ingestion and the collector listen to every image.
+# Ingestion and the collector listen to every image; where all is recorded, the recorder too.
 LISTENERS = 2
 
 
@@ -42,7 +42,9 @@ class BagRunner:
         supervisor, collector = self._supervisor, self._collector
         self._set_up(bag)
         collector.expect([camera.name for camera in bag.cameras])
-        supervisor.set_parameters(REPLAY, {'bag': str(bag.path.resolve())})
+        supervisor.set_parameters(REPLAY, {
+            'bag': str(bag.path.resolve()),
+            'wait_for_subscribers': LISTENERS + bool(self._record)})
         recorder = None
         if self._record:
             recorder = Recorder(supervisor.node, Path(self._record, bag.name),
@@ -77,9 +79,10 @@ class BagRunner:
         self._wait(lambda: all(collector.heard.values()), began, 10.0,
                    f'{bag.name}: not every camera of the bag was heard')
         return self._wait(
-            lambda: self._final(bag, began), began, self._timeout_s,
-            f'{bag.name}: no objects came within {self._timeout_s:g} s of the last image; '
-            'give it more time with --timeout, or a faster profile')
+            lambda: self._final(bag, began), began, self._timeout_s, lambda: (
+                f'{bag.name}: no objects came within {self._timeout_s:g} s of the last image; '
+                'give it more time with --timeout, or a faster profile (the nodes say: '
+                f'{collector.standing()})'))
 
     def _final(self, bag, began):
         """Return the Answer to the last frame set once no newer one can come, else None."""
@@ -111,7 +114,8 @@ class BagRunner:
         own = {'ingestion_node': {'camera_timeout_s': 0.0, 'explain_after_s': 0.0},
                'parsing_node': {'max_instances': limit}}
         for name in CHAIN:
-            self._supervisor.set_parameters(name, {**rig, **own.get(name, {})})
+            self._supervisor.set_parameters(
+                name, {**rig, 'wait_for_stages': True, **own.get(name, {})})
         self._supervisor.bring_up(CHAIN)
         self._rig = rig, limit
 

@@ -70,6 +70,7 @@ class Collector:
         self._before, self.sent = self.sent, None   # stamp of ingestion's latest frame set
         self._reports = 0           # of ingestion since the last news
         self.replay, self.errors = {}, []
+        self._said = {}             # name of a status -> what it says
         self._images = [self._node.create_subscription(
             Image, f'{camera}/depth/image_raw', self._image_taker(camera),
             qos('<camera>/depth/image_raw')) for camera in cameras]
@@ -105,6 +106,7 @@ class Collector:
         stamp = nanoseconds(message.header.stamp)
         self._reports += any(s.name.startswith(_INGESTION) for s in message.status)
         for status in message.status:
+            self._said[status.name] = status.message
             if status.level == DiagnosticStatus.ERROR:
                 self.errors.append((stamp, f'{status.name}: {status.message}'))
             for value in status.values if status.name == f'{_INGESTION}views' else ():
@@ -130,6 +132,15 @@ class Collector:
         sentences = [sentence for when, sentence in self.errors if when > since_ns]
         own = [sentence for sentence in sentences if sentence.startswith(_INGESTION)]
         return own, [sentence for sentence in sentences if sentence not in own]
+
+    def standing(self):
+        """Return in words what every node has said last, without what is all right."""
+        nodes = {}
+        for name, sentence in sorted(self._said.items()):
+            node, _, thing = name.partition(': ')
+            nodes.setdefault(node, []).extend([] if sentence == 'ok' else [f'{thing} {sentence}'])
+        return '; '.join(f'{node}: {", ".join(said) or "ok"}' for node, said in nodes.items()) or (
+            'no node has said anything')
 
     def newest_answer(self):
         """Return the Answer to the newest frame set that has one, None where none has."""

@@ -179,12 +179,13 @@ class Supervisor:
         """
         Serve callbacks until `condition()`; return its value.
 
+        :param complaint: sentence, or callable that returns it.
         :raises HoocError: `complaint` after `timeout_s`, or where a node has died.
         """
         deadline = time.monotonic() + timeout_s
         while not (value := condition()):
             if time.monotonic() > deadline:
-                raise HoocError(complaint)
+                raise HoocError(complaint() if callable(complaint) else complaint)
             self.spin()
         return value
 

@@ -34,7 +34,7 @@ class Script:
     def wait(self, condition, timeout_s, complaint):
         while not (value := condition()):
             if not self.events:
-                raise HoocError(complaint)
+                raise HoocError(complaint() if callable(complaint) else complaint)
             self.events.pop(0)()
         return value
 
@@ -54,10 +54,14 @@ class Script:
             String(data=json.dumps({'state': 'finished'}))))
 
     def report(self, node, thing, sentence='', **values):
+        from diagnostic_msgs.msg import DiagnosticStatus
+        level = DiagnosticStatus.ERROR if sentence else DiagnosticStatus.OK
+        self.state(node, thing, sentence or 'ok', level, **values)
+
+    def state(self, node, thing, sentence, level=b'\0', **values):
         from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
         status = DiagnosticStatus(
-            name=f'{node}: {thing}', message=sentence,
-            level=DiagnosticStatus.ERROR if sentence else DiagnosticStatus.OK,
+            name=f'{node}: {thing}', message=sentence, level=level,
             values=[KeyValue(key=k, value=str(v)) for k, v in values.items()])
         message = DiagnosticArray(status=[status])
         message.header.stamp = time(S)
@@ -139,6 +143,17 @@ def test_a_stage_that_gives_up_ends_the_wait(script):
     script.report('parsing_node', 'parse', 'the model does not fit')
     script.image('a', 1 * S)
     with pytest.raises(HoocError, match='the model does not fit'):
+        script.listen()
+
+
+def test_where_no_answer_comes_the_nodes_are_quoted(script):
+    script.report('parsing_node', 'node')
+    script.state('classification_node', 'classify', 'waits for the first frame set')
+    play(script, [1 * S], [1 * S])
+    script.idle(sent=1 * S)
+    with pytest.raises(HoocError, match=(
+            r'no objects came within 60 s .*classification_node: classify waits for the first '
+            'frame set; ingestion_node: ok; parsing_node: ok')):
         script.listen()
 
 

@@ -37,7 +37,7 @@ def played(bundle, tmp_path_factory):
     from hooc_perception.models.folder import load_model_folder
     from hooc_perception.replay.bag_reader import BagScene
     from hooc_perception.supervisor import environment
-    from hooc_perception.supervisor.bags import BagRunner, LISTENERS
+    from hooc_perception.supervisor.bags import BagRunner
     from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
     bag, model = bundle
     before = dict(os.environ)
@@ -46,7 +46,6 @@ def played(bundle, tmp_path_factory):
     stage = {'model': str(model), 'profile': 'fast', 'seed': SEED}
     parameters = {name: dict(stage) for name in CHAIN}
     parameters['ingestion_node']['max_frame_age_s'] = 0.0
-    parameters[REPLAY] = {'wait_for_subscribers': LISTENERS}
     try:
         with Supervisor((*CHAIN, REPLAY), parameters, isolated=True) as supervisor:
             runner = BagRunner(supervisor, 240.0)

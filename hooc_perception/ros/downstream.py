@@ -1,0 +1,51 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Whether the nodes that work on what a node publishes are found: what goes out before is lost."""
+
+import time
+
+from hooc_perception.errors import HoocError
+
+_ALL = ('classification_node', 'candidate_node', 'parsing_node')
+# Rows of the table of topics that carry a frame set on -> the nodes that need them.
+WORKERS = {
+    'views/<camera>/camera_info': _ALL, 'views/<camera>/extrinsics': _ALL,
+    'views/<camera>/depth_rect': _ALL, 'views/refused': ('ingestion_node',),
+    'pixels/probabilities': ('candidate_node', 'parsing_node'),
+    'candidates/poses': ('parsing_node',), 'candidates/attributes': ('parsing_node',),
+    'candidates/requests': ('candidate_node',), 'candidates/more/poses': ('parsing_node',),
+    'candidates/more/attributes': ('parsing_node',)}
+FOUND_TIMEOUT_S = 30.0
+_POLL_S = 0.01
+
+
+def wait_for_workers(node, topics):
+    """
+    Wait until a node has found every node of its namespace that works on its topics.
+
+    DDS finds endpoints in its own threads, so that a callback may wait.
+
+    :param topics: {topic as published: its row in the table of topics}.
+    :raises HoocError: where somebody is still missing after FOUND_TIMEOUT_S.
+    """
+    deadline = time.monotonic() + FOUND_TIMEOUT_S
+    while missing := _missing(node, topics):
+        if time.monotonic() > deadline:
+            who = sorted({name for names in missing.values() for name in names})
+            raise HoocError(
+                f'{" and ".join(who)} did not come to listen to {", ".join(sorted(missing))} '
+                f'within {FOUND_TIMEOUT_S:g} s: start the whole chain in one namespace, or set '
+                'wait_for_stages to false')
+        time.sleep(_POLL_S)
+
+
+def _missing(node, topics):
+    """Return {topic: names of the nodes that are not found yet}, without those that are."""
+    missing = {}
+    for topic, row in topics.items():
+        there = {info.node_name for info in
+                 node.get_subscriptions_info_by_topic(node.resolve_topic_name(topic))
+                 if info.node_namespace == node.get_namespace()}
+        if not there.issuperset(WORKERS.get(row, ())):
+            missing[topic] = set(WORKERS[row]) - there
+    return missing

@@ -68,7 +68,7 @@ class Collector:
         self.heard = {camera: [] for camera in cameras}     # stamps of its images
         self._arrived = {}          # stamp of an image -> ns of its latest arrival
         self._before, self.sent = self.sent, None   # stamp of ingestion's latest frame set
-        self._reports = 0           # of ingestion since the last news
+        self._news_ns, self._reports = 0, 0     # when it was sent; of ingestion since then
         self.replay, self.errors = {}, []
         self._said = {}             # name of a status -> what it says
         self._images = [self._node.create_subscription(
@@ -79,7 +79,7 @@ class Collector:
         def take(message, info):
             stamp = nanoseconds(message.header.stamp)
             self.heard[camera].append(stamp)
-            self._reports = 0
+            self._note_news(info)
             self._arrived[stamp] = max(self._arrived.get(stamp, 0), info['received_timestamp'])
         return take
 
@@ -95,16 +95,21 @@ class Collector:
                 del self._parts[topic][min(self._parts[topic])]
             if topic == 'objects/poses':
                 self._published[stamp] = info['source_timestamp']
-                self._reports = 0
+                self._note_news(info)
         return take
 
-    def _on_status(self, message):
-        self.replay = json.loads(message.data)
-        self._reports = 0
+    def _note_news(self, info):
+        self._news_ns, self._reports = max(self._news_ns, info['source_timestamp']), 0
 
-    def _on_diagnostics(self, message):
+    def _on_status(self, message, info):
+        self.replay = json.loads(message.data)
+        self._note_news(info)
+
+    def _on_diagnostics(self, message, info):
         stamp = nanoseconds(message.header.stamp)
-        self._reports += any(s.name.startswith(_INGESTION) for s in message.status)
+        # By the time of sending: topics do not keep the order among each other.
+        self._reports += info['source_timestamp'] > self._news_ns and any(
+            s.name.startswith(_INGESTION) for s in message.status)
         for status in message.status:
             self._said[status.name] = status.message
             if status.level == DiagnosticStatus.ERROR:

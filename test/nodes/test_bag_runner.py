@@ -23,7 +23,7 @@ class Script:
         from hooc_perception.supervisor.bags import BagRunner
         self.node = SimpleNamespace(create_subscription=lambda *_: None,
                                     destroy_subscription=lambda _: None)
-        self.processes, self.events = {}, []
+        self.processes, self.events, self.now = {}, [], 0
         self.runner = BagRunner(self, 60.0)
         self.heard = self.runner._collector
         self.heard.expect(['a', 'b'])
@@ -38,34 +38,38 @@ class Script:
             self.events.pop(0)()
         return value
 
+    def sent(self, when=None):
+        self.now += 1
+        return {'source_timestamp': self.now if when is None else when}
+
     def image(self, camera, stamp):
         message = SimpleNamespace(header=SimpleNamespace(stamp=time(stamp)))
         self.events.append(lambda: self.heard._image_taker(camera)(
-            message, {'received_timestamp': stamp}))
+            message, {'received_timestamp': stamp, **self.sent()}))
 
     def answer(self, stamp):
         message = SimpleNamespace(header=SimpleNamespace(stamp=time(stamp)))
         self.events.append(lambda: self.heard._taker('objects/poses')(
-            message, {'source_timestamp': stamp}))
+            message, self.sent()))
 
     def finish(self):
         from std_msgs.msg import String
         self.events.append(lambda: self.heard._on_status(
-            String(data=json.dumps({'state': 'finished'}))))
+            String(data=json.dumps({'state': 'finished'})), self.sent()))
 
     def report(self, node, thing, sentence='', **values):
         from diagnostic_msgs.msg import DiagnosticStatus
         level = DiagnosticStatus.ERROR if sentence else DiagnosticStatus.OK
         self.state(node, thing, sentence or 'ok', level, **values)
 
-    def state(self, node, thing, sentence, level=b'\0', **values):
+    def state(self, node, thing, sentence, level=b'\0', sent=None, **values):
         from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
         status = DiagnosticStatus(
             name=f'{node}: {thing}', message=sentence, level=level,
             values=[KeyValue(key=k, value=str(v)) for k, v in values.items()])
         message = DiagnosticArray(status=[status])
         message.header.stamp = time(S)
-        self.events.append(lambda: self.heard._on_diagnostics(message))
+        self.events.append(lambda: self.heard._on_diagnostics(message, self.sent(sent)))
 
     def idle(self, sent=None):
         for _ in range(2):
@@ -137,6 +141,14 @@ def test_cameras_that_never_meet_are_said_to(script):
     script.idle()
     with pytest.raises(HoocError, match='no moment is seen by all of its cameras'):
         script.listen()
+
+
+def test_reports_that_were_sent_before_the_images_tell_nothing(script):
+    play(script, [1 * S], [1 * S])
+    for _ in range(2):
+        script.state('ingestion_node', 'views', 'ok', sent=0)
+    script.answer(1 * S)
+    assert script.listen().stamp_ns == 1 * S
 
 
 def test_a_stage_that_gives_up_ends_the_wait(script):

@@ -31,6 +31,7 @@ class CameraInput:
         self._poses, self._latched = poses, None
         self._infos, self._images, self._last_info = OrderedDict(), OrderedDict(), None
         self._late = None               # (image, info) whose pose tf does not have yet
+        self._unplaced = None           # (image, info) that came before all word of a pose
         # The stamp of the last image whose own camera_info did not come, 0 = all did.
         self._unmatched = 0
         self.heard = time.monotonic()   # when the last image came
@@ -43,7 +44,7 @@ class CameraInput:
 
     def begin(self):
         """Begin to listen: what was heard before does not count."""
-        self.heard, self._late = time.monotonic(), None
+        self.heard, self._late, self._unplaced = time.monotonic(), None, None
         self._images.clear()
 
     # Reliability.
@@ -76,6 +77,9 @@ class CameraInput:
 
     def _on_extrinsics(self, message):
         self._latched = message
+        unplaced, self._unplaced = self._unplaced, None
+        if unplaced and self.node.active:
+            self._hand_on(*unplaced)
 
     def _on_info(self, message):
         self._last_info = message
@@ -145,12 +149,15 @@ class CameraInput:
 
     def _hand_on(self, image, info):
         """Call back with an image; return the PoseNotYet where its pose is still to come."""
+        self._unplaced = None
         try:
             transform = self._extrinsics(image)
         except PoseNotYet as error:
             return error
         except HoocError as error:
             self.node.diagnostics.warn(self.name, 'no_extrinsics', str(error))
+            # Topics do not keep the order among each other: the latched pose may be under way.
+            self._unplaced = (image, info) if self._latched is None else None
         else:
             self._callback(self.name, image, info, transform)
         return None
@@ -174,4 +181,4 @@ class CameraInput:
         raise HoocError(
             f'nobody says where {self.name} stands: publish {self.name}/extrinsics or /tf_static '
             f"({target} to {frame or 'the camera'}), or set parameter extrinsics.{self.name}; "
-            'the image is dropped')
+            'of its images only the latest waits for that')

@@ -18,6 +18,7 @@ from hooc_perception.ros.misaddressed import misaddressed
 from hooc_perception.ros.parameters import fixed_param, Parameters
 from hooc_perception.ros.qos import overridable, qos
 from hooc_perception.ros.spin import raise_interrupt
+from hooc_perception.ros.tolerant import TolerantLifecycleNode
 from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
@@ -47,7 +48,7 @@ class StageConfig(Config):
         'publishes: for recordings, of which no frame set comes a second time.')
 
 
-class StageNode(LifecycleNode):
+class StageNode(TolerantLifecycleNode):
     """
     A lifecycle node that explains why a transition fails and cleans up behind itself.
 

@@ -220,23 +220,28 @@ class Supervisor:
         A service's answer is lost where the node had not found the client yet. Asking again is
         no harm for other calls; here the node's state tells first whether it is needed.
         """
-        goal = _GOALS[request.transition.id]
+        goal, futures = _GOALS[request.transition.id], [future]
         complaint = f'{name} could not be {done} within {TRANSITION_TIMEOUT_S:g} s'
         deadline = time.monotonic() + TRANSITION_TIMEOUT_S
+
+        def answers():
+            return [future.result().success for future in futures if future.done()]
+
         while time.monotonic() < deadline:
             asked = time.monotonic()
-            self.wait(lambda: future.done() or time.monotonic() - asked > RETRY_S,
-                      TRANSITION_TIMEOUT_S, complaint)
-            if future.done():
-                return future.result().success
+            self.wait(lambda: len(answers()) == len(futures) or any(answers())
+                      or time.monotonic() - asked > RETRY_S, TRANSITION_TIMEOUT_S, complaint)
+            if any(answers()):
+                return True
             # A node answers this only when it is through with the transition.
             state = self.state(name, TRANSITION_TIMEOUT_S, complaint)
             self.wait_a_moment()
-            if future.done():
-                return future.result().success
-            if state == goal:
+            # The second of two requests that both arrive is refused: the first did it.
+            if state == goal or any(answers()):
                 return True
-            future = self._clients[name, ChangeState].call_async(request)
+            if len(answers()) == len(futures):
+                return False
+            futures.append(self._clients[name, ChangeState].call_async(request))
         raise HoocError(complaint)
 
     def state(self, name, timeout_s=SET_TIMEOUT_S, complaint=None):

@@ -54,6 +54,22 @@ def test_what_is_no_pose_is_refused_in_every_state(bench, value, word):
         assert node.poses['a'] == ()
 
 
+def test_an_image_that_overtakes_its_latched_pose_waits_for_it(bench):
+    node, (raw, other), heard = start(bench, 'a', 'b')
+    for stamp in (S, 2 * S):
+        raw.send(stamp)
+        other.send(stamp)
+    assert bench.spin(lambda: bench.reasons(node).get('b', ('',))[0] == 'no_extrinsics')
+    bench.rest(0.2)
+    raw.stand()
+    other.stand()
+    assert bench.spin(lambda: heard['a'] and heard['b'])
+    assert c.nanoseconds(heard['a'][0].header.stamp) == 2 * S
+    raw.stand()     # the pose again, as of a driver that repeats it: the image went out already
+    bench.rest(0.2)
+    assert len(heard['a']) == 1
+
+
 class TransformException(Exception):
     pass
 

@@ -71,6 +71,22 @@ def test_cleaning_up_forgets_everything_that_was_built(bench, folder, module, ki
                              len(list(node.timers)))
 
 
+@pytest.mark.parametrize('wrong', [
+    Transition(id=Transition.TRANSITION_ACTIVATE), Transition(id=99),
+    Transition(label='activate'), Transition(label='no such thing')])
+def test_an_impossible_transition_is_refused_and_costs_nothing(bench, wrong):
+    node = bench.add(replay_node.ReplayNode)
+    client = bench.peer.create_client(ChangeState, '/hooc/replay_node/change_state')
+    states = bench.peer.create_client(GetState, '/hooc/replay_node/get_state')
+    assert bench.spin(lambda: client.service_is_ready() and states.service_is_ready())
+    bench.rest(0.2)
+    answer = client.call_async(ChangeState.Request(transition=wrong))
+    assert bench.spin(answer.done) and not answer.result().success
+    state = states.call_async(GetState.Request())
+    assert bench.spin(state.done) and state.result().current_state.label == 'unconfigured'
+    assert node.trigger_activate() == FAILURE
+
+
 def test_memory_comes_back_to_the_system(bench):
     psutil = pytest.importorskip('psutil')
 

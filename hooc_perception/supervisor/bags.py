@@ -3,15 +3,23 @@
 """Play bags through the nodes, one after the other, and bring the answers back."""
 
 from pathlib import Path
+import shutil
+import sys
 
 from hooc_perception.errors import HoocError
-from hooc_perception.supervisor.collector import Collector
+from hooc_perception.supervisor.collector import Collector, INGESTION
 from hooc_perception.supervisor.recorder import Recorder
 from hooc_perception.supervisor.supervisor import CHAIN, REPLAY
 
 MATCH_TIMEOUT_S = 30.0
 # Ingestion and the collector listen to every image; where all is recorded, the recorder too.
 LISTENERS = 2
+# All nodes idle for so many seconds, and no answer: nobody works on the frame set any more.
+LOST_AFTER_S = 8
+
+
+class FrameSetLost(HoocError):
+    """Every node is idle, nobody has complained, and there is no answer."""
 
 
 class BagRunner:
@@ -28,7 +36,8 @@ class BagRunner:
 
         :param record: folder for a bag a scene of all that goes over the topics, or None.
         """
-        self._supervisor, self._timeout_s, self._record = supervisor, timeout_s, record
+        self._supervisor, self._timeout_s = supervisor, timeout_s
+        self._record = None if record is None else Path(record)
         self._collector = Collector(supervisor.node)
         self._rig = None
 
@@ -36,9 +45,21 @@ class BagRunner:
         """
         Return the Answer to the last frame set of a bag.
 
+        A bag whose frame set gets lost on its way is played once more, with a warning.
+
         :param bag: BagScene.
         :raises HoocError: where a node refuses, dies or does not answer in time.
         """
+        try:
+            return self._play(bag)
+        except FrameSetLost as lost:
+            print(f'warning: {lost}; it is played once more', file=sys.stderr, flush=True)
+            self.start_over()
+            if self._record:
+                shutil.rmtree(self._record / bag.name)
+            return self._play(bag)
+
+    def _play(self, bag):
         supervisor, collector = self._supervisor, self._collector
         self._set_up(bag)
         collector.expect([camera.name for camera in bag.cameras])
@@ -47,7 +68,7 @@ class BagRunner:
             'wait_for_subscribers': LISTENERS + bool(self._record)})
         recorder = None
         if self._record:
-            recorder = Recorder(supervisor.node, Path(self._record, bag.name),
+            recorder = Recorder(supervisor.node, self._record / bag.name,
                                 [camera.name for camera in bag.cameras])
         began = supervisor.node.get_clock().now().nanoseconds
         supervisor.bring_up([REPLAY])
@@ -89,7 +110,7 @@ class BagRunner:
         collector = self._collector
         # A set with the last image of the camera that fell silent first is the last one.
         answer = collector.answer(min(stamps[-1] for stamps in collector.heard.values()))
-        if answer or not collector.idle:
+        if answer or not collector.idle([INGESTION]):
             return answer
         answer = collector.newest_answer()
         refused, given_up = collector.complaints(began)
@@ -98,6 +119,9 @@ class BagRunner:
         if collector.sent is None:
             raise HoocError(refused[0] if refused else (
                 f'{bag.name}: no moment is seen by all of its cameras; hooc doctor says more'))
+        if collector.idle(CHAIN, LOST_AFTER_S):
+            raise FrameSetLost(f'{bag.name}: a frame set went out and no node works on it any '
+                               f'more, so part of it was lost on its way ({collector.standing()})')
         return None
 
     def _set_up(self, bag):

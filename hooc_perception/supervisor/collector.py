@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Listen to what the nodes say about a played bag; written as any user could write it."""
 
+from collections import Counter
 from dataclasses import dataclass
 import json
 
@@ -17,6 +18,8 @@ from hooc_perception.ros.stage_messages import (
 )
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import String
+
+INGESTION = 'ingestion_node'
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,7 @@ class Answer:
     images: dict
 
 
-_INGESTION = 'ingestion_node: '
+_INGESTION = f'{INGESTION}: '
 _PARTS = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
           'scene/summary': String, 'candidates/poses': PoseArray,
           'candidates/attributes': PointCloud2, 'pixels/probabilities': PointCloud2}
@@ -68,7 +71,7 @@ class Collector:
         self.heard = {camera: [] for camera in cameras}     # stamps of its images
         self._arrived = {}          # stamp of an image -> ns of its latest arrival
         self._before, self.sent = self.sent, None   # stamp of ingestion's latest frame set
-        self._news_ns, self._reports = 0, 0     # when it was sent; of ingestion since then
+        self._news_ns, self._reports = 0, Counter()     # when sent; node -> reports since then
         self.replay, self.errors = {}, []
         self._said = {}             # name of a status -> what it says
         self._images = [self._node.create_subscription(
@@ -91,15 +94,16 @@ class Collector:
             else:
                 stamp = nanoseconds(message.header.stamp)
             self._parts[topic][stamp] = message
+            self._note_news(info)
             while len(self._parts[topic]) > 8:
                 del self._parts[topic][min(self._parts[topic])]
             if topic == 'objects/poses':
                 self._published[stamp] = info['source_timestamp']
-                self._note_news(info)
         return take
 
     def _note_news(self, info):
-        self._news_ns, self._reports = max(self._news_ns, info['source_timestamp']), 0
+        self._news_ns = max(self._news_ns, info['source_timestamp'])
+        self._reports.clear()
 
     def _on_status(self, message, info):
         self.replay = json.loads(message.data)
@@ -108,8 +112,8 @@ class Collector:
     def _on_diagnostics(self, message, info):
         stamp = nanoseconds(message.header.stamp)
         # By the time of sending: topics do not keep the order among each other.
-        self._reports += info['source_timestamp'] > self._news_ns and any(
-            s.name.startswith(_INGESTION) for s in message.status)
+        if info['source_timestamp'] > self._news_ns:
+            self._reports.update({s.name.partition(':')[0] for s in message.status})
         for status in message.status:
             self._said[status.name] = status.message
             if status.level == DiagnosticStatus.ERROR:
@@ -119,14 +123,14 @@ class Collector:
                 if value.key == 'stamp_ns' and int(value.value) != self._before:
                     self.sent = int(value.value)
 
-    @property
-    def idle(self):
+    def idle(self, names, reports=2):
         """
-        Say whether ingestion has nothing left to send: it has reported twice since the last news.
+        Say whether nodes have nothing left to do: each has reported so often since the last news.
 
-        Between two reports it has been given all that had arrived.
+        A node reports once a second, but not while it computes. Between two reports it has been
+        given all that had arrived.
         """
-        return self._reports >= 2
+        return all(self._reports[name] >= reports for name in names)
 
     def complaints(self, since_ns):
         """

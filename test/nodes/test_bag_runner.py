@@ -75,6 +75,13 @@ class Script:
         for _ in range(2):
             self.report('ingestion_node', 'views', **({'stamp_ns': sent} if sent else {}))
 
+    def all_idle(self, sent, but=None):
+        for _ in range(8):
+            self.report('ingestion_node', 'views', stamp_ns=sent)
+            for name in ('classification_node', 'candidate_node', 'parsing_node'):
+                if name != but:
+                    self.report(name, 'node')
+
     def listen(self):
         return self.runner._listen(BAG, 0)
 
@@ -167,6 +174,48 @@ def test_where_no_answer_comes_the_nodes_are_quoted(script):
             r'no objects came within 60 s .*classification_node: classify waits for the first '
             'frame set; ingestion_node: ok; parsing_node: ok')):
         script.listen()
+
+
+def test_a_set_that_nobody_works_on_is_lost(script):
+    from hooc_perception.supervisor.bags import FrameSetLost
+    play(script, [1 * S], [1 * S])
+    script.all_idle(sent=1 * S)
+    with pytest.raises(FrameSetLost, match='part of it was lost .* parsing_node: ok'):
+        script.listen()
+
+
+def test_a_node_that_computes_is_waited_for(script):
+    play(script, [1 * S], [1 * S])
+    script.all_idle(sent=1 * S, but='parsing_node')
+    script.answer(1 * S)
+    assert script.listen().stamp_ns == 1 * S
+
+
+def test_parts_of_an_answer_are_news(script):
+    play(script, [1 * S], [1 * S])
+    script.all_idle(sent=1 * S, but='parsing_node')
+    script.events.append(lambda: script.heard._taker('pixels/probabilities')(
+        SimpleNamespace(header=SimpleNamespace(stamp=time(S))), script.sent()))
+    for _ in range(8):
+        script.report('parsing_node', 'node')
+    script.answer(1 * S)
+    assert script.listen().stamp_ns == 1 * S
+
+
+def test_a_lost_set_is_played_once_more(script, monkeypatch, capsys):
+    from hooc_perception.supervisor.bags import FrameSetLost
+    answers, begun = [FrameSetLost('gone'), 'answer', *[FrameSetLost('gone')] * 2], []
+
+    def one_play(bag):
+        if isinstance(answers[0], HoocError):
+            raise answers.pop(0)
+        return answers.pop(0)
+    monkeypatch.setattr(script.runner, '_play', one_play)
+    monkeypatch.setattr(script.runner, 'start_over', lambda: begun.append(True))
+    assert script.runner.play(BAG) == 'answer' and begun == [True]
+    assert 'gone; it is played once more' in capsys.readouterr().err
+    with pytest.raises(HoocError, match='gone'):
+        script.runner.play(BAG)
 
 
 def test_what_ingestion_said_of_the_last_bag_does_not_count(script):

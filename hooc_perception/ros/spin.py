@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run one node in one process: single-threaded, ends quietly on signals and orphanhood."""
 
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 import ctypes
 import os
 import signal
@@ -17,6 +17,8 @@ from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
 
 PARENT_VARIABLE = 'HOOC_SUPERVISOR_PID'
+# Destroying a node takes less than a second.
+END_GRACE_S = 10
 HEED_S = 0.2    # Python heeds a signal when it is through with waiting
 _PR_SET_PDEATHSIG = 1
 
@@ -81,9 +83,28 @@ def _run(make_node, args):
         if node is not None:
             if rclpy.ok():
                 node.leave()
-            node.destroy_node()
-        rclpy.try_shutdown()
+        with _no_longer_than(END_GRACE_S):
+            if node is not None:
+                node.destroy_node()
+            rclpy.try_shutdown()
     return 0
+
+
+@contextmanager
+def _no_longer_than(seconds):
+    """
+    Have the kernel end this process where the block takes longer.
+
+    Fast DDS can deadlock with its own discovery while a participant is destroyed, with the
+    interpreter's lock held: no thread of ours would get to act.
+    """
+    if hasattr(signal, 'alarm'):
+        signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        if hasattr(signal, 'alarm'):
+            signal.alarm(0)
 
 
 def end_with_parent():

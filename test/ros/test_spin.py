@@ -50,6 +50,23 @@ class Node(rclpy.node.Node):
 sys.exit(run_node(Node))
 """
 
+STUCK = HEAD + """
+import ctypes
+from hooc_perception.ros import spin
+spin.END_GRACE_S = 1
+class Node(rclpy.node.Node):
+    def __init__(self):
+        super().__init__('stuck')
+        self.create_timer(0.01, self.end)
+    def end(self):
+        raise KeyboardInterrupt
+    def leave(self):
+        pass
+    def destroy_node(self):
+        ctypes.PyDLL(None).sleep(50)    # with the interpreter's lock, as Fast DDS can
+sys.exit(run_node(Node))
+"""
+
 
 def run(code):
     """Return the CompletedProcess of Python code."""
@@ -75,6 +92,12 @@ def test_signals_end_a_node_quietly_also_when_repeated(number):
     process.send_signal(number)
     _, said = process.communicate(timeout=30)
     assert (process.returncode, said) == (0, '')
+
+
+def test_a_node_that_cannot_be_destroyed_does_not_stay():
+    began = time.monotonic()
+    assert run(STUCK).returncode == -signal.SIGALRM
+    assert time.monotonic() - began < 40
 
 
 def test_an_interrupt_of_compiled_code_is_one():

@@ -77,9 +77,8 @@ class CameraInput:
 
     def _on_extrinsics(self, message):
         self._latched = message
-        unplaced, self._unplaced = self._unplaced, None
-        if unplaced and self.node.active:
-            self._hand_on(*unplaced)
+        if self._unplaced and self.node.active:
+            self._hand_on(*self._unplaced)
 
     def _on_info(self, message):
         self._last_info = message

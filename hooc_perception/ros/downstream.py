@@ -29,9 +29,10 @@ def wait_for_workers(node, topics):
     :raises HoocError: where somebody is still missing after FOUND_TIMEOUT_S.
     """
     deadline = time.monotonic() + FOUND_TIMEOUT_S
-    while missing := _missing(node, topics):
+    needed = {topic: WORKERS[row] for topic, row in topics.items() if row in WORKERS}
+    while missing := _missing(node, needed):
         if time.monotonic() > deadline:
-            who = sorted({name for names in missing.values() for name in names})
+            who = sorted(set().union(*missing.values()))
             raise HoocError(
                 f'{" and ".join(who)} did not come to listen to {", ".join(sorted(missing))} '
                 f'within {FOUND_TIMEOUT_S:g} s: start the whole chain in one namespace, or set '
@@ -39,13 +40,13 @@ def wait_for_workers(node, topics):
         time.sleep(_POLL_S)
 
 
-def _missing(node, topics):
-    """Return {topic: names of the nodes that are not found yet}, without those that are."""
+def _missing(node, needed):
+    """Return {topic: set of the names in `needed` that are not found yet}, no empty ones."""
     missing = {}
-    for topic, row in topics.items():
+    for topic, names in needed.items():
         there = {info.node_name for info in
                  node.get_subscriptions_info_by_topic(node.resolve_topic_name(topic))
                  if info.node_namespace == node.get_namespace()}
-        if not there.issuperset(WORKERS.get(row, ())):
-            missing[topic] = set(WORKERS[row]) - there
+        if absent := set(names) - there:
+            missing[topic] = absent
     return missing

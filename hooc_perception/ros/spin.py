@@ -80,9 +80,8 @@ def _run(make_node, args):
         print(f'[ERROR] {error}', file=sys.stderr, flush=True)
         return 1
     finally:
-        if node is not None:
-            if rclpy.ok():
-                node.leave()
+        if node is not None and rclpy.ok():
+            node.leave()
         with _no_longer_than(END_GRACE_S):
             if node is not None:
                 node.destroy_node()
@@ -98,13 +97,12 @@ def _no_longer_than(seconds):
     Fast DDS can deadlock with its own discovery while a participant is destroyed, with the
     interpreter's lock held: no thread of ours would get to act.
     """
-    if hasattr(signal, 'alarm'):
-        signal.alarm(seconds)
+    alarm = getattr(signal, 'alarm', lambda _: None)    # Windows has none
+    alarm(seconds)
     try:
         yield
     finally:
-        if hasattr(signal, 'alarm'):
-            signal.alarm(0)
+        alarm(0)
 
 
 def end_with_parent():

@@ -12,7 +12,7 @@ from hooc_perception.cli.main import main
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.errors import HoocError
 from hooc_perception.executor import executor
-from hooc_perception.models.derive import derive
+from hooc_perception.objects.derive import derive
 from hooc_perception.synthesis import twin
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.training.fit_forest import FitConfig

@@ -10,11 +10,11 @@ from hooc_perception.benchmark.mutate import damaged
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.diagnosis.bag import check_bag
 from hooc_perception.errors import HoocError
-from hooc_perception.replay.bag_files import iter_messages
-from hooc_perception.replay.bag_reader import BagScene
-from hooc_perception.replay.bag_writer import write_bag
-from hooc_perception.replay.mcap_file import records
-from hooc_perception.replay.salvage import salvaged
+from hooc_perception.io.bags.files import iter_messages
+from hooc_perception.io.bags.mcap_file import records
+from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.io.bags.salvage import salvaged
+from hooc_perception.io.bags.writer import write_bag
 import numpy as np
 
 _W, _H = 32, 24

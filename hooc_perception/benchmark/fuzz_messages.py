@@ -5,19 +5,19 @@
 from hooc_perception.benchmark.fuzz_bags import small_scene
 from hooc_perception.benchmark.mutate import damaged, odd_number, odd_text
 from hooc_perception.core.geometry import pose_from_matrix
-from hooc_perception.core.observe import observe, ObserveConfig, rectify
-from hooc_perception.core.plausible import table_trouble
+from hooc_perception.core.segment.checks import table_trouble
+from hooc_perception.core.segment.observe import observe, ObserveConfig, rectify
 from hooc_perception.core.types import Candidates, PixelProbabilities
 from hooc_perception.errors import HoocError
-from hooc_perception.ros import conversions as c
-from hooc_perception.ros.raw_frames import RawFrames
-from hooc_perception.ros.reproposal import parsed_request, request_text
-from hooc_perception.ros.stage_messages import (
+from hooc_perception.ros.inputs.raw_frames import RawFrames
+from hooc_perception.ros.messages import conversions as c
+from hooc_perception.ros.messages.stages import (
     candidates_from_messages,
     candidates_messages,
     probabilities_from_message,
     probabilities_message,
 )
+from hooc_perception.ros.reproposal import parsed_request, request_text
 import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Image

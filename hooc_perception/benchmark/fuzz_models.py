@@ -9,17 +9,17 @@ import shutil
 
 from hooc_perception.benchmark.fuzz_bags import small_scene
 from hooc_perception.benchmark.mutate import odd_array
-from hooc_perception.core.classify import classify
+from hooc_perception.core.classification.classify import classify
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe
-from hooc_perception.core.parse import parse
+from hooc_perception.core.hypotheses.propose import propose
+from hooc_perception.core.parsing.parse import parse
 from hooc_perception.core.profiles import profile, with_overrides
-from hooc_perception.core.propose import propose
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import Candidates, PixelProbabilities, RectifiedView
 from hooc_perception.errors import HoocError
-from hooc_perception.models.catalogue import CATALOGUE
-from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import load_model_folder, save_model_folder
+from hooc_perception.objects.catalogue import CATALOGUE
+from hooc_perception.objects.derive import derive
+from hooc_perception.trained.folder import load_model_folder, save_model_folder
 import numpy as np
 
 # Of the source tree; an installed package has none, and these cases less to look at.

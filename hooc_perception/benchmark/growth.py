@@ -8,7 +8,7 @@ import gc
 from pathlib import Path
 import time
 
-from hooc_perception.core.forest import Forest
+from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile as named_profile

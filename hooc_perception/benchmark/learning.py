@@ -3,9 +3,9 @@
 """Contests of classification and alignment: forests and ICP."""
 
 from hooc_perception.benchmark.measure import Contest, Contestant
-from hooc_perception.core.forest import Forest
+from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.geometry import matrix_from_pose, stage_rng, transform
-from hooc_perception.core.icp import align, model_cloud
+from hooc_perception.core.methods.icp import align, model_cloud
 import numpy as np
 import open3d as o3d
 from scipy.spatial.transform import Rotation

@@ -4,13 +4,13 @@
 
 from hooc_perception.benchmark.measure import Contest, Contestant
 from hooc_perception.benchmark.scene import candidate_meshes
-from hooc_perception.core.eq1 import D_MAX_M, Eq1
-from hooc_perception.core.genetic import genetic_search, GeneticConfig
+from hooc_perception.core.energy.eq1 import D_MAX_M, Eq1
+from hooc_perception.core.energy.local_search import local_search
+from hooc_perception.core.energy.overlap import pairwise, union_shares
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.local_search import local_search
-from hooc_perception.core.overlap import pairwise, union_shares
+from hooc_perception.core.methods.genetic import genetic_search, GeneticConfig
 from hooc_perception.core.render import render_depth
-from hooc_perception.models.repair import closed
+from hooc_perception.objects.repair import closed
 import manifold3d
 import numpy as np
 import trimesh

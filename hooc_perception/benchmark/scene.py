@@ -5,10 +5,10 @@
 from dataclasses import dataclass
 
 from hooc_perception.core.geometry import posed_vertices, stage_rng
-from hooc_perception.core.observe import observe
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import Candidates, Observation, PixelProbabilities
-from hooc_perception.models.catalogue import CATALOGUE
-from hooc_perception.models.derive import derive
+from hooc_perception.objects.catalogue import CATALOGUE
+from hooc_perception.objects.derive import derive
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.synthesis.scatter import ScatterConfig
 from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig

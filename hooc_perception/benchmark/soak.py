@@ -15,8 +15,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, TransformStamped
 from hooc_perception.core.geometry import pose_from_matrix, stage_rng
 from hooc_perception.errors import HoocError
-from hooc_perception.replay.bag_reader import BagScene
-from hooc_perception.ros.conversions import (
+from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.ros.messages.conversions import (
     camera_info_message,
     depth_message,
     header,

@@ -71,7 +71,7 @@ def run(args):
                         f'{", ".join(contests)}')
     folder = None
     if args.model:      # a model that cannot be read is better refused before minutes of work
-        from hooc_perception.models.folder import load_model_folder
+        from hooc_perception.trained.folder import load_model_folder
         folder = load_model_folder(args.model)
     scene = bench_scene(args.seed)
     entries = [entry for name, make in tqdm(chosen.items(), desc='stages', disable=None)
@@ -109,7 +109,7 @@ def _growth(args):
     """Measure how time and memory grow, print and draw it."""
     from hooc_perception.benchmark.growth import grow, write_plot
     from hooc_perception.cli.demo import bundle_root, MODEL
-    from hooc_perception.models.folder import load_model_folder
+    from hooc_perception.trained.folder import load_model_folder
     from tqdm import tqdm
     folder = load_model_folder(args.model or bundle_root() / MODEL)
     profile = args.profile or folder.profile
@@ -130,7 +130,7 @@ def _growth(args):
 
 def _write_json(path, content):
     """Write figures to a file and say so."""
-    from hooc_perception.scenes.files import write_atomically
+    from hooc_perception.io.scenes.files import write_atomically
     write_atomically(path, json.dumps(content, indent=1) + '\n')
     print(path)
 
@@ -156,8 +156,8 @@ def _soak(args):
     """Run the nodes for a long time, print and draw their memory; return the exit code."""
     from hooc_perception.benchmark.soak import soak, write_plot
     from hooc_perception.cli.demo import bundle_root, MODEL, SCENE
-    from hooc_perception.models.folder import load_model_folder
     from hooc_perception.supervisor.supervisor import CHAIN
+    from hooc_perception.trained.folder import load_model_folder
     from tqdm import tqdm
     if not 0 < args.soak <= 1e5:
         raise HoocError(f'--soak is {args.soak:g}; give the minutes that it may take')

@@ -44,8 +44,8 @@ def run(args):
 def write_bags(args):
     """Write one bag a scene."""
     from hooc_perception.cli.places import folder_place
-    from hooc_perception.replay.bag_writer import write_bag
-    from hooc_perception.scenes.scene_set import load_scene_set
+    from hooc_perception.io.bags.writer import write_bag
+    from hooc_perception.io.scenes.scene_set import load_scene_set
     from tqdm import tqdm
 
     folder_place(args.out, '--out')
@@ -58,9 +58,9 @@ def write_bags(args):
 
 def write_calibrations(entries, unit, out):
     """Write a cameras.yaml from entries NAME=FILE[#VIEW]."""
-    from hooc_perception.scenes.bouguet import load_bouguet, upright
-    from hooc_perception.scenes.camera_files import write_cameras
-    from hooc_perception.scenes.files import unique
+    from hooc_perception.io.scenes.bouguet import load_bouguet, upright
+    from hooc_perception.io.scenes.camera_files import write_cameras
+    from hooc_perception.io.scenes.files import unique
 
     if not 1e-6 <= unit <= 1:
         raise HoocError(f'--unit is {unit:g}; give metres, 0.001 for a board in millimetres')

@@ -42,9 +42,9 @@ def run(args):
         make_bundle(root)
     from hooc_perception.cli import run as run_command
     from hooc_perception.evaluation.tables import to_text
-    from hooc_perception.models.folder import load_model_folder
-    from hooc_perception.replay.bag_reader import BagScene
-    from hooc_perception.scenes.results import load_results
+    from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.io.scenes.results import load_results
+    from hooc_perception.trained.folder import load_model_folder
     results = args.out / 'results.json'
     if run_command.run(_run_arguments(args, root, results)):
         return 1
@@ -92,8 +92,8 @@ def make_bundle(root):
     The model is trained on generic meshes and cameras, in the small size of profile `fast`; the
     scene is not part of it.
     """
-    from hooc_perception.replay.bag_writer import write_bag
-    from hooc_perception.scenes.scene_set import load_scene_set
+    from hooc_perception.io.bags.writer import write_bag
+    from hooc_perception.io.scenes.scene_set import load_scene_set
     from hooc_perception.synthesis.twin import TwinOptions, write_twin
     from hooc_perception.training.train import train
     with tempfile.TemporaryDirectory() as folder:

@@ -32,7 +32,7 @@ def run(args):
         args.bags = [_salvage(args.bags[0], args.salvage)]
     if args.bags:
         from hooc_perception.diagnosis.bag import check_bag, check_rig
-        from hooc_perception.models.folder import load_model_folder
+        from hooc_perception.trained.folder import load_model_folder
         model = load_model_folder(args.model) if args.model else None
         for path in args.bags:
             print(path)
@@ -50,7 +50,7 @@ def run(args):
 
 def _salvage(path, out):
     """Write what can be read of a bag to a new one; return the latter."""
-    from hooc_perception.replay.salvage import salvaged, write_salvaged
+    from hooc_perception.io.bags.salvage import salvaged, write_salvaged
     found = salvaged(path)
     for note in dict.fromkeys(found.notes):
         print(f'  {note}')

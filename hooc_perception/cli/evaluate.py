@@ -54,9 +54,9 @@ def run(args):
     """Run the command; return the exit code."""
     from hooc_perception.cli.categories import warn_of_gap
     from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models, table_1
-    from hooc_perception.models.folder import load_model_folder
-    from hooc_perception.scenes.results import load_results
-    from hooc_perception.scenes.scene_set import load_scene_set
+    from hooc_perception.io.scenes.results import load_results
+    from hooc_perception.io.scenes.scene_set import load_scene_set
+    from hooc_perception.trained.folder import load_model_folder
 
     if args.stages and not args.model:
         raise HoocError('--stages runs the chain again and needs a trained model; '
@@ -116,7 +116,7 @@ def _check_places(args):
 
 def _check_match(path, content, scene_set):
     """Refuse results that have no scene in common with the set; say what is not scored."""
-    from hooc_perception.scenes.results import scenes_in_common
+    from hooc_perception.io.scenes.results import scenes_in_common
     known = {scene.name for scene in scene_set.scenes}
     _, others = scenes_in_common(content, known, path, scene_set.path)
     if others:
@@ -143,7 +143,7 @@ def _baseline_place(args):
 def _baseline(args, scene_set, models):
     """Run the baseline; return (path, content) of its results."""
     from hooc_perception.evaluation.baselines import run_baseline
-    from hooc_perception.scenes.results import load_results
+    from hooc_perception.io.scenes.results import load_results
     path = _baseline_place(args)
     run_baseline(args.baseline, scene_set, models, path, args.seed)
     return path, load_results(path)
@@ -182,7 +182,7 @@ def _visibility_tables(visibility):
 def _write(args, evaluations, contents, tables, scene_set, visibility, truth_energy, stages):
     """Print the tables and write whatever files were asked for."""
     from hooc_perception.evaluation.tables import to_markdown, to_text
-    from hooc_perception.scenes.files import write_atomically
+    from hooc_perception.io.scenes.files import write_atomically
 
     if not tables:
         raise HoocError(f'{args.set}: no scene has true poses or instance labels; there is '

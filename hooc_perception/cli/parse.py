@@ -39,9 +39,9 @@ def run(args):
     from hooc_perception.core.pipeline import Pipeline
     from hooc_perception.core.profiles import profile, with_overrides
     from hooc_perception.executor import executor, spread
-    from hooc_perception.models.folder import load_model_folder
-    from hooc_perception.scenes.results import scene_result, write_results
-    from hooc_perception.scenes.scene_set import load_scene_set
+    from hooc_perception.io.scenes.results import scene_result, write_results
+    from hooc_perception.io.scenes.scene_set import load_scene_set
+    from hooc_perception.trained.folder import load_model_folder
     from tqdm import tqdm
 
     out = file_place(args.out, '--out')

@@ -27,7 +27,7 @@ def run(args):
     """Run the command; return the exit code."""
     import json
 
-    from hooc_perception.replay.bag_reader import BagScene
+    from hooc_perception.io.bags.reader import BagScene
     from hooc_perception.ros.qos import qos
     from hooc_perception.supervisor.supervisor import REPLAY, Supervisor
     from std_msgs.msg import String

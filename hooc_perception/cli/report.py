@@ -40,8 +40,8 @@ def run(args):
     from hooc_perception.evaluation.report.page import write_report
     from hooc_perception.evaluation.report.recording import rerun_sdk, write_recording
     from hooc_perception.evaluation.report.scene import report_scene
-    from hooc_perception.models.folder import load_model_folder
-    from hooc_perception.scenes.results import load_results, scenes_in_common
+    from hooc_perception.io.scenes.results import load_results, scenes_in_common
+    from hooc_perception.trained.folder import load_model_folder
     from tqdm import tqdm
 
     if args.candidates and not args.model:
@@ -87,18 +87,18 @@ def _source(args, results, folder):
 
     That is --set, else the set or the bags that the results name, relative to their own file.
     """
-    from hooc_perception.models.folder import load_model_folder
+    from hooc_perception.trained.folder import load_model_folder
     base = Path(args.results).parent
     place = args.set or _named(base, results, 'set')
     if place:
         from hooc_perception.evaluation.evaluate import scoring_models
-        from hooc_perception.scenes.scene_set import load_scene_set
+        from hooc_perception.io.scenes.scene_set import load_scene_set
         scene_set = load_scene_set(place).selected(args.scene)
         models = ({model.name: model for model in folder.models} if folder
                   else scoring_models(scene_set))
         return SimpleNamespace(name=scene_set.name, place=place, scenes=scene_set.scenes,
                                models=models, views=lambda scene, entry: scene.depth())
-    from hooc_perception.replay.bag_reader import BagScene
+    from hooc_perception.io.bags.reader import BagScene
     wanted = args.scene or [entry['scene'] for entry in results['scenes']]
     bags = {entry['scene']: bag for entry in results['scenes']
             if entry['scene'] in wanted and (bag := _named(base, entry, 'bag'))}

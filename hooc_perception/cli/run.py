@@ -42,9 +42,9 @@ def run(args):
     from hooc_perception.cli.categories import warn_of_gap
     from hooc_perception.cli.failures import tell_failures
     from hooc_perception.cli.places import relative_place
-    from hooc_perception.models.folder import load_model_folder
-    from hooc_perception.replay.bag_reader import BagScene
-    from hooc_perception.scenes.results import scene_result, write_results
+    from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.io.scenes.results import scene_result, write_results
+    from hooc_perception.trained.folder import load_model_folder
     if not args.timeout > 0:
         raise HoocError(f'--timeout is {args.timeout:g}; give the seconds that a scene may take')
     check_places(args)

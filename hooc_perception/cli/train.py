@@ -29,7 +29,7 @@ def run(args):
     from hooc_perception.cli.places import folder_place
     from hooc_perception.errors import HoocError
     from hooc_perception.executor import executor
-    from hooc_perception.scenes.scene_set import load_scene_set
+    from hooc_perception.io.scenes.scene_set import load_scene_set
     from hooc_perception.training.train import train
     if args.seed < 0 or args.jobs < 0:
         raise HoocError('--seed and --jobs must not be negative')

@@ -30,9 +30,9 @@ def add_arguments(parser):
 def run(args):
     """Run the command until it is interrupted."""
     from hooc_perception.cli.run import chain_parameters, model_defaults
-    from hooc_perception.models.folder import load_model_folder
     from hooc_perception.supervisor.keeper import Keeper
     from hooc_perception.supervisor.supervisor import CHAIN, Supervisor
+    from hooc_perception.trained.folder import load_model_folder
     model = load_model_folder(args.model)
     parameters = chain_parameters(args, model)
     if args.cameras:
@@ -62,7 +62,7 @@ def run(args):
 def camera_poses(path):
     """Return {camera: [x, y, z, qx, qy, qz, qw]} of a cameras.yaml."""
     from hooc_perception.core.geometry import pose_from_matrix
-    from hooc_perception.scenes.camera_files import load_cameras
+    from hooc_perception.io.scenes.camera_files import load_cameras
     poses = {}
     for name, camera in load_cameras(path).items():
         translation, rotation = pose_from_matrix(camera.T_world_camera)

@@ -4,13 +4,13 @@
 
 import time
 
-from hooc_perception.core.classify import classify
-from hooc_perception.core.finish import finished, with_sigmas
+from hooc_perception.core.classification.classify import classify
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe, rectify
-from hooc_perception.core.parse import parse
-from hooc_perception.core.propose import propose, propose_more
-from hooc_perception.core.verify import Verifier
+from hooc_perception.core.hypotheses.propose import propose, propose_more
+from hooc_perception.core.parsing.calibration import finished, with_sigmas
+from hooc_perception.core.parsing.parse import parse
+from hooc_perception.core.parsing.verifier import Verifier
+from hooc_perception.core.segment.observe import observe, rectify
 
 
 class Pipeline:

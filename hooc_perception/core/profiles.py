@@ -9,10 +9,10 @@ beyond it as far as it can, `fast` trades some of that for time.
 
 from dataclasses import dataclass, fields, replace
 
-from hooc_perception.core.classify import ClassifyConfig
-from hooc_perception.core.observe import ObserveConfig
-from hooc_perception.core.parse import ParseConfig
-from hooc_perception.core.propose import ProposeConfig
+from hooc_perception.core.classification.classify import ClassifyConfig
+from hooc_perception.core.hypotheses.propose import ProposeConfig
+from hooc_perception.core.parsing.parse import ParseConfig
+from hooc_perception.core.segment.observe import ObserveConfig
 from hooc_perception.errors import HoocError
 
 NAMES = ('paper', 'best', 'fast')

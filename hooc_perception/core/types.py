@@ -200,7 +200,7 @@ class ParsedScene:
     """
     The answer for one frame set, with its evidence.
 
-    :ivar objects: the chosen candidates, refined; `score` in [0, 1], see core.finish.
+    :ivar objects: the chosen candidates, refined; `score` in [0, 1], see core.parsing.calibration.
     :ivar energy: Eq. 1 of the chosen subset (for every profile, so that they compare).
     :ivar visible_ratio: (n,) float32 share of each object's rendered pixels that are in sight.
     :ivar residual_m: (n,) float32 mean absolute depth residual over the pixels where it agrees.
@@ -208,7 +208,7 @@ class ParsedScene:
     :ivar n_views: (n,) uint8 number of views that show it.
     :ivar pool: every candidate that was considered.
     :ivar sigma_t, sigma_r: (n,) float32, metres and radians within which 68 % of the errors lie,
-        see core.uncertainty; NaN where that is not known, None where nobody asked.
+        see core.parsing.uncertainty; NaN where that is not known, None where nobody asked.
     :ivar converged: False where a deadline ended the search.
     :ivar seconds: wall time of each stage.
     """

@@ -5,16 +5,16 @@
 from collections import defaultdict
 from dataclasses import dataclass, field
 
-from hooc_perception.core.classify import KIND_PAPER
-from hooc_perception.core.depth_encodings import decode_depth
-from hooc_perception.core.observe import observe, ObserveConfig, rectify
-from hooc_perception.core.plausible import NEAREST_M, rig_trouble
+from hooc_perception.core.classification.classify import KIND_PAPER
+from hooc_perception.core.segment.checks import rig_trouble
+from hooc_perception.core.segment.observe import observe, ObserveConfig, rectify
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING
 from hooc_perception.errors import HoocError
-from hooc_perception.replay.bag_files import iter_messages, topics
-from hooc_perception.replay.bag_reader import BagScene
-from hooc_perception.replay.camera_topics import camera_from_info, depth_topics
-from hooc_perception.replay.salvage import salvaged
+from hooc_perception.io.bags.camera_topics import camera_from_info, depth_topics
+from hooc_perception.io.bags.files import iter_messages, topics
+from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.io.bags.salvage import salvaged
+from hooc_perception.io.depth_encodings import decode_depth, NEAREST_M
 import numpy as np
 
 IMAGE, INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'

@@ -6,8 +6,8 @@ import re
 
 from hooc_perception.core.geometry import inverse, matrix_from_pose
 from hooc_perception.evaluation.matching import in_frame_of, posed
-from hooc_perception.models.mesh import mesh_box
-from hooc_perception.scenes.files import write_atomically
+from hooc_perception.io.scenes.files import write_atomically
+from hooc_perception.objects.mesh import mesh_box
 
 _OBJECT = re.compile(r'obj_(\d+)\Z')
 _SCENE = re.compile(r'(\d{6})(?:_(\d{6}))?\Z')

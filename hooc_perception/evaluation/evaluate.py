@@ -5,7 +5,7 @@
 from dataclasses import dataclass, field
 
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import ObserveConfig, rectified_numbers, rectify
+from hooc_perception.core.segment.observe import ObserveConfig, rectified_numbers, rectify
 from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.bop import bop_score
@@ -13,9 +13,9 @@ from hooc_perception.evaluation.masks import score_masks
 from hooc_perception.evaluation.matching import in_frame_of, posed
 from hooc_perception.evaluation.scores import per_category, score_scene
 from hooc_perception.evaluation.visibility import scene_visibility
-from hooc_perception.models.mesh import load_mesh
-from hooc_perception.models.repair import closed
-from hooc_perception.models.symmetry import axis_symmetry
+from hooc_perception.objects.mesh import load_mesh
+from hooc_perception.objects.repair import closed
+from hooc_perception.objects.symmetry import axis_symmetry
 import numpy as np
 
 # Scores look at all of an image; what the chain leaves out as too far is its own business.

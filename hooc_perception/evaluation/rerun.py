@@ -4,11 +4,11 @@
 
 from itertools import repeat
 
-from hooc_perception.core.classify import classify
-from hooc_perception.core.eq1 import energy_of
-from hooc_perception.core.observe import observe, rectify
+from hooc_perception.core.classification.classify import classify
+from hooc_perception.core.energy.eq1 import energy_of
 from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile as named_profile
+from hooc_perception.core.segment.observe import observe, rectify
 from hooc_perception.evaluation.matching import posed
 from hooc_perception.evaluation.scores import score_scene
 from hooc_perception.evaluation.stages import as_candidates, as_objects, pixel_scores, pool_recall

@@ -4,8 +4,8 @@
 
 from dataclasses import asdict, dataclass, field
 
-from hooc_perception.core.observe import rectify
 from hooc_perception.core.render import render_depth, render_patch
+from hooc_perception.core.segment.observe import rectify
 from hooc_perception.core.types import RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.as_json import plain
@@ -13,7 +13,7 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.evaluate import RECTIFY
 from hooc_perception.evaluation.matching import posed
 from hooc_perception.evaluation.tables import Table
-from hooc_perception.scenes.files import read_json
+from hooc_perception.io.scenes.files import read_json
 import numpy as np
 
 # What shows at this share of an object's pixels was put in its place.

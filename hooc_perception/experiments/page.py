@@ -18,7 +18,7 @@ from hooc_perception.evaluation.worst import worst_table
 from hooc_perception.experiments import ablations
 from hooc_perception.experiments import experiment_tables as tables
 from hooc_perception.experiments.plan import Layout, SCORED
-from hooc_perception.scenes.files import write_atomically
+from hooc_perception.io.scenes.files import write_atomically
 
 END = '<!-- end of results -->'
 SECTION = re.compile(r'(<!-- results: ([\w ]+) -->\n).*?(' + re.escape(END) + ')', re.S)

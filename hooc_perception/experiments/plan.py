@@ -14,7 +14,7 @@ from pathlib import Path
 from hooc_perception.errors import HoocError
 from hooc_perception.experiments.ablations import ROW as ABLATIONS
 from hooc_perception.experiments.ablations import SWITCHES
-from hooc_perception.scenes.scene_set import load_scene_set
+from hooc_perception.io.scenes.scene_set import load_scene_set
 
 PROFILES = ('paper', 'best', 'fast')
 BASELINES = ('fpfh', 'ppf')
@@ -22,13 +22,13 @@ SCORED = PROFILES + BASELINES
 ROWS = SCORED + (ABLATIONS,)
 
 # Modules whose code, with all that they import, a kind of step runs.
-_SETS = 'hooc_perception.scenes.scene_set'
+_SETS = 'hooc_perception.io.scenes.scene_set'
 CODE = {
     'twin': ('hooc_perception.synthesis.twin',),
     'train': ('hooc_perception.training.train', _SETS),
     'parse': ('hooc_perception.core.pipeline', 'hooc_perception.core.profiles',
-              'hooc_perception.evaluation.true_poses', 'hooc_perception.models.folder',
-              'hooc_perception.scenes.results', _SETS),
+              'hooc_perception.evaluation.true_poses', 'hooc_perception.trained.folder',
+              'hooc_perception.io.scenes.results', _SETS),
     'baseline': ('hooc_perception.evaluation.baselines', _SETS),
     'scores': ('hooc_perception.evaluation.as_json', 'hooc_perception.evaluation.evaluate',
                _SETS),

@@ -14,7 +14,7 @@ import time
 from hooc_perception.errors import HoocError
 from hooc_perception.experiments import fingerprint
 from hooc_perception.experiments.plan import CODE
-from hooc_perception.scenes.files import write_atomically
+from hooc_perception.io.scenes.files import write_atomically
 
 RECORDS = 'steps.json'
 

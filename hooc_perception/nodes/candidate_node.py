@@ -7,18 +7,18 @@ import time
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe
+from hooc_perception.core.hypotheses.propose import propose
 from hooc_perception.core.pipeline import proposer
-from hooc_perception.core.propose import propose
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
-from hooc_perception.ros.conversions import header
+from hooc_perception.ros.inputs.view_topics import ViewInput
+from hooc_perception.ros.lifecycle.spin import run_node
+from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.messages.conversions import header
+from hooc_perception.ros.messages.stages import candidates_messages, probabilities_from_message
 from hooc_perception.ros.reproposal import no_answer_messages, parsed_request, Proposers
-from hooc_perception.ros.spin import run_node
-from hooc_perception.ros.stage_messages import candidates_messages, probabilities_from_message
-from hooc_perception.ros.stage_node import StageConfig, StageNode
-from hooc_perception.ros.view_topics import ViewInput
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 

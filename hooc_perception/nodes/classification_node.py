@@ -5,17 +5,17 @@
 import sys
 import time
 
-from hooc_perception.core.classify import classify, KIND_PAPER
-from hooc_perception.core.observe import observe
-from hooc_perception.core.plausible import rig_trouble
+from hooc_perception.core.classification.classify import classify, KIND_PAPER
+from hooc_perception.core.segment.checks import rig_trouble
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
-from hooc_perception.ros.conversions import header, labels_message
-from hooc_perception.ros.spin import run_node
-from hooc_perception.ros.stage_messages import label_images, probabilities_message
-from hooc_perception.ros.stage_node import StageConfig, StageNode
-from hooc_perception.ros.view_topics import ViewInput
+from hooc_perception.ros.inputs.view_topics import ViewInput
+from hooc_perception.ros.lifecycle.spin import run_node
+from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.messages.conversions import header, labels_message
+from hooc_perception.ros.messages.stages import label_images, probabilities_message
 import numpy as np
 from sensor_msgs.msg import Image, PointCloud2
 

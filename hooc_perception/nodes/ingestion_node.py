@@ -8,20 +8,20 @@ import time
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.config import param
-from hooc_perception.core.observe import rectified_numbers, rectify
-from hooc_perception.core.plausible import table_trouble
+from hooc_perception.core.segment.checks import table_trouble
+from hooc_perception.core.segment.observe import rectified_numbers, rectify
 from hooc_perception.core.types import DepthView, RectifiedView
 from hooc_perception.errors import HoocError
+from hooc_perception.io.frame_sets import EXPLAINED, FrameSetConfig, FrameSets, SILENT
 from hooc_perception.nodes.model import camera_names
 from hooc_perception.nodes.warm_up import overhead_camera
-from hooc_perception.ros.camera_input import CameraInput
-from hooc_perception.ros.camera_poses import PoseParameters, TfPoses
-from hooc_perception.ros.conversions import nanoseconds
-from hooc_perception.ros.frame_sets import EXPLAINED, FrameSetConfig, FrameSets, SILENT
-from hooc_perception.ros.raw_frames import FrameRefused, RawFrames
-from hooc_perception.ros.spin import run_node
-from hooc_perception.ros.stage_node import StageConfig, StageNode
-from hooc_perception.ros.view_topics import ViewOutput
+from hooc_perception.ros.inputs.camera_input import CameraInput
+from hooc_perception.ros.inputs.camera_poses import PoseParameters, TfPoses
+from hooc_perception.ros.inputs.raw_frames import FrameRefused, RawFrames
+from hooc_perception.ros.inputs.view_topics import ViewOutput
+from hooc_perception.ros.lifecycle.spin import run_node
+from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.messages.conversions import nanoseconds
 import numpy as np
 from std_msgs.msg import Header
 

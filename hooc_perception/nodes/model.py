@@ -3,8 +3,8 @@
 """What the nodes take from the MODEL folder."""
 
 from hooc_perception.errors import HoocError
-from hooc_perception.models.folder import load_model_folder
-from hooc_perception.ros.found import topic_token
+from hooc_perception.ros.outputs.found import topic_token
+from hooc_perception.trained.folder import load_model_folder
 
 
 def model_of(node):

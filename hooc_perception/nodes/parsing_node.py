@@ -9,25 +9,28 @@ import time
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.config import param
-from hooc_perception.core.finish import finished, with_sigmas
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe
-from hooc_perception.core.parse import parse
-from hooc_perception.core.tracking import TrackConfig, Tracker
-from hooc_perception.core.unexplained import unexplained_points
-from hooc_perception.core.verify import Verifier
+from hooc_perception.core.parsing.calibration import finished, with_sigmas
+from hooc_perception.core.parsing.parse import parse
+from hooc_perception.core.parsing.tracking import TrackConfig, Tracker
+from hooc_perception.core.parsing.unexplained import unexplained_points
+from hooc_perception.core.parsing.verifier import Verifier
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
-from hooc_perception.ros.adapters.choose import AdapterConfig, adapters_of, tell
-from hooc_perception.ros.detect_service import DetectService
-from hooc_perception.ros.diagnostics import WARN
-from hooc_perception.ros.found import found_scene
-from hooc_perception.ros.object_output import ObjectOutput
+from hooc_perception.ros.health.diagnostics import WARN
+from hooc_perception.ros.inputs.view_topics import ViewInput
+from hooc_perception.ros.lifecycle.spin import run_node
+from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.messages.stages import (
+    candidates_from_messages,
+    probabilities_from_message,
+)
+from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_of, tell
+from hooc_perception.ros.outputs.detect_service import DetectService
+from hooc_perception.ros.outputs.found import found_scene
+from hooc_perception.ros.outputs.object_output import ObjectOutput
 from hooc_perception.ros.reproposal import MoreCandidates
-from hooc_perception.ros.spin import run_node
-from hooc_perception.ros.stage_messages import candidates_from_messages, probabilities_from_message
-from hooc_perception.ros.stage_node import StageConfig, StageNode
-from hooc_perception.ros.view_topics import ViewInput
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import SetBool, Trigger
 

@@ -10,17 +10,17 @@ from geometry_msgs.msg import PoseArray, TransformStamped
 from hooc_perception.core.config import param
 from hooc_perception.core.geometry import pose_from_matrix
 from hooc_perception.errors import HoocError
-from hooc_perception.replay.bag_reader import BagScene, iter_messages
-from hooc_perception.ros.conversions import (
+from hooc_perception.io.bags.reader import BagScene, iter_messages
+from hooc_perception.ros.lifecycle.spin import run_node
+from hooc_perception.ros.lifecycle.stage_node import StageNode
+from hooc_perception.ros.messages.conversions import (
     camera_info_message,
     header,
     nanoseconds,
     time_message,
     transform_message,
 )
-from hooc_perception.ros.player import Player, PlayerConfig
-from hooc_perception.ros.spin import run_node
-from hooc_perception.ros.stage_node import StageNode
+from hooc_perception.ros.outputs.player import Player, PlayerConfig
 from rclpy.duration import Duration
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import CameraInfo, Image

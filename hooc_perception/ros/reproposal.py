@@ -14,9 +14,9 @@ import time
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.types import Candidates
 from hooc_perception.errors import HoocError
-from hooc_perception.ros.conversions import nanoseconds
-from hooc_perception.ros.point_clouds import cloud_rows
-from hooc_perception.ros.stage_messages import candidates_from_messages, candidates_messages
+from hooc_perception.ros.messages.conversions import nanoseconds
+from hooc_perception.ros.messages.point_clouds import cloud_rows
+from hooc_perception.ros.messages.stages import candidates_from_messages, candidates_messages
 import numpy as np
 from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import String
@@ -118,7 +118,7 @@ class MoreCandidates:
                         for part, kind in (('poses', PoseArray), ('attributes', PointCloud2))}
 
     def asker(self, stamp_ns, timeout_s):
-        """Return the callable (objects, round) -> Candidates that core.parse wants."""
+        """Return the callable (objects, round) -> Candidates that core.parsing.parse wants."""
         def more(objects, turn):
             self._requests.publish(String(data=request_text(stamp_ns, turn, objects)))
             try:

@@ -9,13 +9,13 @@ import json
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.types import Energy, ParsedScene, PixelProbabilities
-from hooc_perception.ros.conversions import nanoseconds
-from hooc_perception.ros.point_clouds import cloud_rows
-from hooc_perception.ros.qos import qos
-from hooc_perception.ros.stage_messages import (
+from hooc_perception.ros.messages.conversions import nanoseconds
+from hooc_perception.ros.messages.point_clouds import cloud_rows
+from hooc_perception.ros.messages.stages import (
     candidates_from_messages,
     probabilities_from_message,
 )
+from hooc_perception.ros.qos import qos
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import String
 

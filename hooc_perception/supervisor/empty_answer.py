@@ -5,9 +5,9 @@
 import json
 
 from geometry_msgs.msg import PoseArray
-from hooc_perception.ros.adapters.detections import detections_message
-from hooc_perception.ros.found import FoundScene
-from hooc_perception.ros.object_output import empty_clouds, summary_json
+from hooc_perception.ros.outputs.adapters.detections import detections_message
+from hooc_perception.ros.outputs.found import FoundScene
+from hooc_perception.ros.outputs.object_output import empty_clouds, summary_json
 from hooc_perception.ros.qos import qos
 from hooc_perception.supervisor.shown import optional_messages
 from sensor_msgs.msg import PointCloud2

@@ -10,7 +10,7 @@ import socket
 import sys
 
 from hooc_perception.errors import HoocError
-from hooc_perception.ros.spin import PARENT_VARIABLE
+from hooc_perception.ros.lifecycle.spin import PARENT_VARIABLE
 from rclpy.exceptions import InvalidNamespaceException
 from rclpy.validate_namespace import validate_namespace
 

@@ -5,7 +5,7 @@
 from collections import Counter
 import time
 
-from hooc_perception.ros.diagnostics import Diagnostics
+from hooc_perception.ros.health.diagnostics import Diagnostics
 from hooc_perception.supervisor.empty_answer import EmptyAnswer
 from hooc_perception.supervisor.pulse import Pulse
 from hooc_perception.supervisor.shared_memory import free_orphans

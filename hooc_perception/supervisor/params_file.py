@@ -8,7 +8,7 @@ import re
 import tempfile
 
 from hooc_perception.errors import HoocError
-from hooc_perception.scenes import files
+from hooc_perception.io.scenes import files
 
 
 def unreached_sections(path, names, namespace):

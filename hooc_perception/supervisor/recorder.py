@@ -5,7 +5,7 @@
 import time
 
 from geometry_msgs.msg import PoseArray, TransformStamped
-from hooc_perception.replay.raw_writer import RawBagWriter
+from hooc_perception.io.bags.raw_writer import RawBagWriter
 from hooc_perception.ros.qos import qos
 from rclpy.qos import DurabilityPolicy
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2

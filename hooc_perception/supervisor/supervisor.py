@@ -8,7 +8,7 @@ import sys
 import time
 
 from hooc_perception.errors import HoocError
-from hooc_perception.ros.parameters import parameter_message
+from hooc_perception.ros.lifecycle.parameters import parameter_message
 from hooc_perception.supervisor.environment import full_namespace, isolate, use_large_segments
 from hooc_perception.supervisor.params_file import unreached_sections
 from hooc_perception.supervisor.processes import NodeProcess

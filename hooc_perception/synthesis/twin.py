@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.errors import HoocError
-from hooc_perception.models.catalogue import CATALOGUE
-from hooc_perception.models.derive import derive
-from hooc_perception.scenes.scene import TrueObject
-from hooc_perception.scenes.writer import NewScene, write_scene_set
+from hooc_perception.io.scenes.scene import TrueObject
+from hooc_perception.io.scenes.writer import NewScene, write_scene_set
+from hooc_perception.objects.catalogue import CATALOGUE
+from hooc_perception.objects.derive import derive
 from hooc_perception.synthesis.raw_views import Caster
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.synthesis.room import draw_room, RoomConfig

@@ -10,8 +10,8 @@ reference in the tests, an order of magnitude slower on this many classes and fe
 
 from dataclasses import dataclass
 
+from hooc_perception.core.classification.forest import Forest, quantised
 from hooc_perception.core.config import Config, param
-from hooc_perception.core.forest import Forest, quantised
 from hooc_perception.training import fit_kernels
 from joblib import delayed, Parallel
 import numpy as np

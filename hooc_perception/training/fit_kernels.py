@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Growing one decision tree on quantised features, by information gain."""
 
-from hooc_perception.core.kernels.forest_pixels import respond
+from hooc_perception.core.classification.kernels.pixel_forest import respond
 import numba as nb
 import numpy as np
 
@@ -251,7 +251,7 @@ def grow_pixel_tree(images, scene, centre, y, samples, n_classes, n_tests, n_thr
 
     :param images: (S, V, H, W) uint16 mm; scene (n,), centre (n, V, 3), y (n,) of pixels.
     :param samples: (m,) int32 pixels that grow the tree; reordered in place.
-    :return: as in `core.pixel_forest.PixelForest`, one test an inner node.
+    :return: as in `core.classification.pixel_forest.PixelForest`, one test an inner node.
     """
     np.random.seed(seed)
     m, n_views = samples.shape[0], images.shape[1]

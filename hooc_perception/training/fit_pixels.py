@@ -9,13 +9,13 @@ is a named parameter here.
 
 from dataclasses import dataclass
 
-from hooc_perception.core import pixel_forest
+from hooc_perception.core.classification import pixel_forest
+from hooc_perception.core.classification.forest import Forest, quantised
+from hooc_perception.core.classification.kernels import pixel_forest as forest_pixels
 from hooc_perception.core.config import Config, param
-from hooc_perception.core.forest import Forest, quantised
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.kernels import forest_pixels
-from hooc_perception.core.observe import observe
 from hooc_perception.core.profiles import profile
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.training import fit_kernels
 from joblib import delayed, Parallel
 import numpy as np

@@ -1,7 +1,7 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Learn to verify candidates (core/verify.py) from synthetic scenes parsed by the whole chain.
+Learn to verify candidates (core/parsing/verifier.py) from parsed synthetic scenes.
 
 The scenes are of the same kind as those that taught the classifier, but others: a classifier
 looks too good on what it has seen.
@@ -9,15 +9,15 @@ looks too good on what it has seen.
 
 from dataclasses import dataclass, replace
 
-from hooc_perception.core.classify import classify
+from hooc_perception.core.classification.classify import classify
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe
+from hooc_perception.core.hypotheses.propose import propose
+from hooc_perception.core.parsing.search import search_scene
+from hooc_perception.core.parsing.verifier import FEATURES, features
 from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile as profile_of
-from hooc_perception.core.propose import propose
-from hooc_perception.core.search import search_scene
-from hooc_perception.core.verify import FEATURES, features
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.synthesis.training_scenes import training_scene
 from hooc_perception.training.fit_forest import fit, FitConfig, quantise, thresholds
 from hooc_perception.training.fused_scenes import FusedScenesConfig, scene_config

@@ -4,10 +4,10 @@
 
 from dataclasses import dataclass, replace
 
-from hooc_perception.core import features
+from hooc_perception.core.classification import features
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.synthesis.scatter import ScatterConfig
 from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
 from hooc_perception.training.fit_forest import quantise, thresholds
@@ -50,7 +50,7 @@ class FusedTable:
     Quantised features of labelled pixels.
 
     :ivar binned: (F, n) uint8; `cuts` (F, bins - 1) float32; `y` (n,) uint8 classes;
-        `scene` (n,) int32; `probes` (P, 5) as in `core.features.draw_probes`.
+        `scene` (n,) int32; `probes` (P, 5) as in `core.classification.features.draw_probes`.
     """
 
     binned: np.ndarray

@@ -11,14 +11,14 @@ from dataclasses import asdict, dataclass
 import json
 from pathlib import Path
 
-from hooc_perception.core.classify import FORMAT_VERSION, KIND_FUSED, KIND_PAPER
+from hooc_perception.core.classification.classify import FORMAT_VERSION, KIND_FUSED, KIND_PAPER
 from hooc_perception.core.config import Config
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.errors import HoocError
-from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import check_place, save_model_folder
-from hooc_perception.models.mesh import load_mesh
+from hooc_perception.objects.derive import derive
+from hooc_perception.objects.mesh import load_mesh
 from hooc_perception.synthesis.training_scenes import PAPER, training_scenes
+from hooc_perception.trained.folder import check_place, save_model_folder
 from hooc_perception.training import fit_pixels
 from hooc_perception.training.fit_forest import fit, FitConfig
 from hooc_perception.training.fit_verifier import fit_verifier, VerifierConfig

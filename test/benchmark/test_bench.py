@@ -8,7 +8,7 @@ from hooc_perception.benchmark import learning, parsing, rendering
 from hooc_perception.benchmark.measure import Contest, Contestant, hold
 from hooc_perception.benchmark.scene import bench_scene
 from hooc_perception.cli.main import main
-from hooc_perception.core.eq1 import Eq1
+from hooc_perception.core.energy.eq1 import Eq1
 from hooc_perception.core.render import render_depth
 from hooc_perception.errors import HoocError
 import numpy as np

@@ -5,9 +5,9 @@
 from types import SimpleNamespace
 
 from hooc_perception.benchmark import growth
-from hooc_perception.core.forest import Forest
+from hooc_perception.core.classification.forest import Forest
 from hooc_perception.errors import HoocError
-from hooc_perception.models.folder import load_model_folder
+from hooc_perception.trained.folder import load_model_folder
 import numpy as np
 import pytest
 

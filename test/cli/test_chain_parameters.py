@@ -11,8 +11,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.nodes.ingestion_node import IngestionConfig  # noqa: E402
-from hooc_perception.supervisor import bags, supervisor  # noqa: E402
+from hooc_perception.nodes.ingestion_node import IngestionConfig
+from hooc_perception.supervisor import bags, supervisor
 
 MODEL = SimpleNamespace(profile='fast', seed=5)
 

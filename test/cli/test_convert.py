@@ -4,9 +4,9 @@
 
 from hooc_perception.cli.main import main
 from hooc_perception.core.types import Camera
-from hooc_perception.replay.bag_reader import BagScene, topics
-from hooc_perception.scenes.camera_files import load_cameras
-from hooc_perception.scenes.scene_set import NewScene, write_scene_set
+from hooc_perception.io.bags.reader import BagScene, topics
+from hooc_perception.io.scenes.camera_files import load_cameras
+from hooc_perception.io.scenes.scene_set import NewScene, write_scene_set
 import numpy as np
 import pytest
 from scipy.io import savemat

@@ -14,10 +14,10 @@ from hooc_perception.core.geometry import back_project
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera, PixelProbabilities
 from hooc_perception.errors import HoocError
-from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import save_model_folder
-from hooc_perception.scenes.results import load_results
-from hooc_perception.scenes.scene_set import NewScene, TrueObject, write_scene_set
+from hooc_perception.io.scenes.results import load_results
+from hooc_perception.io.scenes.scene_set import NewScene, TrueObject, write_scene_set
+from hooc_perception.objects.derive import derive
+from hooc_perception.trained.folder import save_model_folder
 import numpy as np
 import pytest
 import trimesh

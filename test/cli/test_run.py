@@ -10,7 +10,7 @@ from hooc_perception.cli import run as command
 from hooc_perception.cli.main import main
 from hooc_perception.core.types import Candidates, Energy, ParsedScene
 from hooc_perception.errors import HoocError
-from hooc_perception.replay.bag_reader import BagScene
+from hooc_perception.io.bags.reader import BagScene
 import numpy as np
 import pytest
 

@@ -5,7 +5,7 @@
 from types import SimpleNamespace
 
 from hooc_perception.cli import main as cli
-from hooc_perception.models.catalogue import CATALOGUE, write_catalogue
+from hooc_perception.objects.catalogue import CATALOGUE, write_catalogue
 
 
 def test_a_set_without_any_scene_can_be_trained_on(tmp_path, monkeypatch, capsys):

@@ -5,9 +5,9 @@
 from types import SimpleNamespace
 
 from hooc_perception.core.geometry import posed_vertices, stage_rng
-from hooc_perception.core.observe import observe, rectify
-from hooc_perception.core.propose import propose, ProposeConfig
+from hooc_perception.core.hypotheses.propose import propose, ProposeConfig
 from hooc_perception.core.render import render_depth
+from hooc_perception.core.segment.observe import observe, rectify
 from hooc_perception.core.types import (
     Camera,
     Candidates,
@@ -15,7 +15,7 @@ from hooc_perception.core.types import (
     PixelProbabilities,
     RectifiedView,
 )
-from hooc_perception.models.derive import derive
+from hooc_perception.objects.derive import derive
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

@@ -5,13 +5,13 @@
 from dataclasses import replace
 
 from hooc_perception.core import pipeline
-from hooc_perception.core.finish import finished
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe, rectify
-from hooc_perception.core.parse import parse, ParseConfig
+from hooc_perception.core.hypotheses.propose import propose, propose_more
+from hooc_perception.core.parsing.calibration import finished
+from hooc_perception.core.parsing.parse import parse, ParseConfig
 from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile
-from hooc_perception.core.propose import propose, propose_more
+from hooc_perception.core.segment.observe import observe, rectify
 from hooc_perception.core.types import Candidates
 from hooc_perception.errors import HoocError
 import numpy as np

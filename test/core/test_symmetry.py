@@ -4,12 +4,7 @@
 
 from types import SimpleNamespace
 
-from hooc_perception.core.symmetry import (
-    half_turns,
-    is_ball,
-    rotation_error,
-    symmetry_rotations,
-)
+from hooc_perception.core.symmetry import half_turns, is_ball, rotation_error, symmetry_rotations
 from hooc_perception.core.types import Candidates
 import numpy as np
 import pytest

@@ -10,8 +10,8 @@ from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.diagnosis.bag import check_bag
 from hooc_perception.diagnosis.finding import ERROR, OK, WARNING, worst
-from hooc_perception.replay.bag_files import iter_messages, topics
-from hooc_perception.replay.bag_writer import STORAGES, TYPES, write_bag
+from hooc_perception.io.bags.files import iter_messages, topics
+from hooc_perception.io.bags.writer import STORAGES, TYPES, write_bag
 import numpy as np
 import pytest
 from rosbags.interfaces import QosDurability
@@ -297,7 +297,7 @@ def test_a_damaged_bag_is_salvaged_and_checked_again(sound, tmp_path, capsys):
 
 @pytest.mark.parametrize('cameras, word', [(3, 'can be used'), (2, 'trained for 2 cameras')])
 def test_models_that_do_not_fit_the_rig(sound, cameras, word):
-    from hooc_perception.core.classify import KIND_PAPER
+    from hooc_perception.core.classification.classify import KIND_PAPER
     from hooc_perception.diagnosis.bag import check_rig
     model = SimpleNamespace(name='m', classifier={'kind': np.array(KIND_PAPER)}, cameras=tuple(
         camera_above(f'camera{i}', i * 2.1) for i in range(cameras)))

@@ -8,7 +8,12 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.evaluate import scoring_models
 from hooc_perception.evaluation.matching import posed
 from hooc_perception.evaluation.report.scene import report_scene
-from hooc_perception.scenes.scene_set import load_scene_set, NewScene, TrueObject, write_scene_set
+from hooc_perception.io.scenes.scene_set import (
+    load_scene_set,
+    NewScene,
+    TrueObject,
+    write_scene_set,
+)
 from hooc_perception.synthesis.rigs import look_at
 import numpy as np
 import pytest

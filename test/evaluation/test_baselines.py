@@ -6,7 +6,7 @@ import cv2
 from hooc_perception.cli.main import main
 from hooc_perception.evaluation.baselines import BaselineConfig, run_baseline
 from hooc_perception.evaluation.evaluate import evaluate_results
-from hooc_perception.scenes.results import load_results
+from hooc_perception.io.scenes.results import load_results
 import pytest
 
 

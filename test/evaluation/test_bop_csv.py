@@ -8,7 +8,7 @@ import json
 from hooc_perception.core.geometry import inverse, matrix_from_pose, pose_from_matrix
 from hooc_perception.evaluation.bop_csv import write_bop_csv
 from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models
-from hooc_perception.scenes.scene_set import load_scene_set
+from hooc_perception.io.scenes.scene_set import load_scene_set
 import numpy as np
 from scipy.spatial.transform import Rotation
 

@@ -9,7 +9,7 @@ import sys
 from hooc_perception.core.geometry import back_project
 from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models
 from hooc_perception.evaluation.masks import match_masks
-from hooc_perception.scenes.scene_set import load_scene_set
+from hooc_perception.io.scenes.scene_set import load_scene_set
 import numpy as np
 import pytest
 

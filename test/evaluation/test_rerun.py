@@ -4,14 +4,14 @@
 
 from types import SimpleNamespace
 
-from hooc_perception.core.observe import ObserveConfig
+from hooc_perception.core.segment.observe import ObserveConfig
 from hooc_perception.core.types import Energy, PixelProbabilities
 from hooc_perception.evaluation import rerun as rerun_module
 from hooc_perception.evaluation.paper_tables import energy_table
 from hooc_perception.evaluation.stage_tables import stage_category_table, stage_table
 from hooc_perception.evaluation.stages import as_candidates, true_classes
 from hooc_perception.evaluation.tables import to_text
-from hooc_perception.models.derive import derive
+from hooc_perception.objects.derive import derive
 import numpy as np
 import pytest
 import trimesh

@@ -12,7 +12,7 @@ from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models, table_1
 from hooc_perception.evaluation.matching import match_by_centre, posed, PosedObject
 from hooc_perception.evaluation.scores import means, score_scene
-from hooc_perception.scenes.scene_set import load_scene_set
+from hooc_perception.io.scenes.scene_set import load_scene_set
 import numpy as np
 import pytest
 

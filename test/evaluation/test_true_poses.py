@@ -4,20 +4,20 @@
 
 from pathlib import Path
 
-from hooc_perception.core.classify import classify
+from hooc_perception.core.classification.classify import classify
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe, rectify
-from hooc_perception.core.parse import parse
+from hooc_perception.core.parsing.parse import parse
 from hooc_perception.core.profiles import profile
+from hooc_perception.core.segment.observe import observe, rectify
 from hooc_perception.core.types import Candidates, PixelProbabilities
 from hooc_perception.evaluation.matching import posed
 from hooc_perception.evaluation.scores import score_scene
 from hooc_perception.evaluation.stages import as_candidates, as_objects, true_classes
 from hooc_perception.evaluation.true_poses import with_true_poses
-from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import load_model_folder
-from hooc_perception.replay.bag_reader import BagScene
-from hooc_perception.scenes.scene import TrueObject
+from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.io.scenes.scene import TrueObject
+from hooc_perception.objects.derive import derive
+from hooc_perception.trained.folder import load_model_folder
 import numpy as np
 import pytest
 import trimesh

@@ -24,9 +24,9 @@ def test_cpp_client_reads_what_the_parsing_node_writes(repository, tmp_path):
     if not (include / 'sensor_msgs').is_dir():
         pytest.skip('no message headers in this environment')
     from hooc_perception.core.types import Candidates, Energy, ParsedScene
-    from hooc_perception.models.derive import derive
-    from hooc_perception.ros import conversions as c
-    from hooc_perception.ros.stage_messages import labels_json, objects_messages
+    from hooc_perception.objects.derive import derive
+    from hooc_perception.ros.messages import conversions as c
+    from hooc_perception.ros.messages.stages import labels_json, objects_messages
     import trimesh
     rng = np.random.default_rng(0)
     models = [derive(name, trimesh.creation.box(), rng, 50, 50) for name in ('tea cup', 'drill')]

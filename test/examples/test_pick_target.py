@@ -21,10 +21,10 @@ SIZE = (0.06, 0.2, 0.1)
 @pytest.fixture
 def say():
     """Return (publish(stamp_ns, rows), environment of the listener) on a private domain."""
-    from hooc_perception.models.derive import derive
-    from hooc_perception.ros import conversions as c
+    from hooc_perception.objects.derive import derive
+    from hooc_perception.ros.messages import conversions as c
+    from hooc_perception.ros.messages.stages import labels_json, objects_messages
     from hooc_perception.ros.qos import qos
-    from hooc_perception.ros.stage_messages import labels_json, objects_messages
     from hooc_perception.supervisor.environment import claim_domain
     from sensor_msgs.msg import PointCloud2
     from std_msgs.msg import String

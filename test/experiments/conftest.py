@@ -8,7 +8,7 @@ from hooc_perception.cli.main import main as hooc
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera
 from hooc_perception.experiments import fingerprint, plan, run
-from hooc_perception.scenes.scene_set import NewScene, TrueObject, write_scene_set
+from hooc_perception.io.scenes.scene_set import NewScene, TrueObject, write_scene_set
 import numpy as np
 import pytest
 import trimesh

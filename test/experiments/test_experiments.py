@@ -124,11 +124,12 @@ def test_damaged_records_are_named(tmp_path):
 def test_steps_hang_on_the_code_that_they_run():
     trained = fingerprint.modules_of(plan.CODE['train'])
     # The verifier learns from scenes that the chain has parsed.
-    assert {'hooc_perception.training.fit_pixels', 'hooc_perception.core.kernels.forest_pixels',
-            'hooc_perception.synthesis.settle', 'hooc_perception.core.parse'} <= set(trained)
+    assert {'hooc_perception.training.fit_pixels', 'hooc_perception.synthesis.settle',
+            'hooc_perception.core.classification.kernels.pixel_forest',
+            'hooc_perception.core.parsing.parse'} <= set(trained)
     assert 'hooc_perception.evaluation.scores' not in trained
     parsed = fingerprint.modules_of(plan.CODE['parse'])
-    assert 'hooc_perception.core.parse' in parsed
+    assert 'hooc_perception.core.parsing.parse' in parsed
     assert not any(name.startswith('hooc_perception.training') for name in parsed)
 
 

@@ -7,9 +7,9 @@ import time
 
 from hooc_perception.core.geometry import pose_from_matrix
 from hooc_perception.core.types import Energy, ParsedScene
-from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import save_model_folder
 from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera
+from hooc_perception.objects.derive import derive
+from hooc_perception.trained.folder import save_model_folder
 import numpy as np
 import pytest
 import trimesh
@@ -158,7 +158,7 @@ def make_chain(bench, folder, monkeypatch):
         ingestion_node,
         parsing_node,
     )
-    from hooc_perception.ros import conversions as c
+    from hooc_perception.ros.messages import conversions as c
     from hooc_perception.ros.qos import qos
     from rclpy.lifecycle import TransitionCallbackReturn
     from sensor_msgs.msg import CameraInfo, Image

@@ -6,7 +6,7 @@ from geometry_msgs.msg import TransformStamped
 from hooc_perception.core.geometry import matrix_from_pose
 from hooc_perception.core.types import Camera
 from hooc_perception.nodes.ingestion_node import IngestionNode
-from hooc_perception.ros import conversions as c
+from hooc_perception.ros.messages import conversions as c
 from hooc_perception.ros.qos import qos
 import numpy as np
 from rclpy.lifecycle import TransitionCallbackReturn

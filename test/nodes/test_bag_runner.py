@@ -87,7 +87,7 @@ class Script:
 
 
 def time(stamp_ns):
-    from hooc_perception.ros.conversions import time_message
+    from hooc_perception.ros.messages.conversions import time_message
     return time_message(stamp_ns)
 
 

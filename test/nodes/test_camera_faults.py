@@ -11,7 +11,7 @@ import pytest
 
 rclpy = pytest.importorskip('rclpy')
 
-from hooc_perception.ros import conversions as c  # noqa: E402
+from hooc_perception.ros.messages import conversions as c  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
 from rclpy.qos import QoSProfile, ReliabilityPolicy  # noqa: E402
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image  # noqa: E402

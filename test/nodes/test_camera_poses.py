@@ -10,9 +10,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.nodes.ingestion_node import IngestionNode  # noqa: E402
-from hooc_perception.ros import camera_poses  # noqa: E402
-from hooc_perception.ros import conversions as c  # noqa: E402
+from hooc_perception.nodes.ingestion_node import IngestionNode
+from hooc_perception.ros.inputs import camera_poses
+from hooc_perception.ros.messages import conversions as c
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 

@@ -10,7 +10,7 @@ to the last bit; and what the last stage answers comes out as promised.
 from dataclasses import replace
 import json
 
-from hooc_perception.core.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe, rectify
 from hooc_perception.core.types import DepthView
 import numpy as np
 import pytest
@@ -18,13 +18,13 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.core.geometry import stage_rng  # noqa: E402
-from hooc_perception.nodes import parsing_node  # noqa: E402
-from hooc_perception.nodes.warm_up import overhead_camera  # noqa: E402
-from hooc_perception.ros import conversions as c  # noqa: E402
-from hooc_perception.ros.point_clouds import cloud_rows  # noqa: E402
-from hooc_perception.ros.qos import qos  # noqa: E402
-from hooc_perception.ros.stage_messages import candidates_from_messages  # noqa: E402
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.nodes import parsing_node
+from hooc_perception.nodes.warm_up import overhead_camera
+from hooc_perception.ros.messages import conversions as c
+from hooc_perception.ros.messages.point_clouds import cloud_rows
+from hooc_perception.ros.messages.stages import candidates_from_messages
+from hooc_perception.ros.qos import qos
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402

@@ -8,9 +8,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.ros import downstream  # noqa: E402
-from hooc_perception.ros.qos import qos, TOPICS  # noqa: E402
-from hooc_perception.ros.stage_node import StageConfig, StageNode  # noqa: E402
+from hooc_perception.ros.health import downstream
+from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.qos import qos, TOPICS
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402

@@ -13,9 +13,9 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.ros.qos import qos  # noqa: E402
-from hooc_perception.supervisor.empty_answer import EmptyAnswer  # noqa: E402
-from hooc_perception.supervisor.shown import Shown  # noqa: E402
+from hooc_perception.ros.qos import qos
+from hooc_perception.supervisor.empty_answer import EmptyAnswer
+from hooc_perception.supervisor.shown import Shown
 from rclpy.clock import Clock  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402

@@ -34,11 +34,11 @@ def bundle(request):
 @pytest.fixture(scope='module')
 def played(bundle, tmp_path_factory):
     """Return (Answer, Answer of a second play, prints of two late subscribers, recording)."""
-    from hooc_perception.models.folder import load_model_folder
-    from hooc_perception.replay.bag_reader import BagScene
+    from hooc_perception.io.bags.reader import BagScene
     from hooc_perception.supervisor import environment
     from hooc_perception.supervisor.bags import BagRunner
     from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
+    from hooc_perception.trained.folder import load_model_folder
     bag, model = bundle
     before = dict(os.environ)
     for name in ('ROS_DOMAIN_ID', *environment.FAST_DDS_VARIABLES):
@@ -73,8 +73,8 @@ def played(bundle, tmp_path_factory):
 def test_nodes_and_one_process_find_the_same_objects(bundle, played):
     from hooc_perception.core.pipeline import Pipeline
     from hooc_perception.core.profiles import profile
-    from hooc_perception.models.folder import load_model_folder
-    from hooc_perception.replay.bag_reader import BagScene
+    from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.trained.folder import load_model_folder
     scene, model = BagScene(bundle[0]), load_model_folder(bundle[1])
     alone = Pipeline(model.models, model.classifier, profile('fast'), SEED,
                      scene.info['max_instances']).parse_scene(scene.views())
@@ -100,7 +100,7 @@ def test_the_answer_has_a_duration(played):
 
 
 def test_a_late_subscriber_can_name_every_object(bundle, played):
-    from hooc_perception.models.folder import load_model_folder
+    from hooc_perception.trained.folder import load_model_folder
     names = [m.name for m in load_model_folder(bundle[1]).models]
     *lines, last = played[2].strip().splitlines()
     assert last == 'done table'
@@ -122,7 +122,7 @@ def test_the_example_of_a_planner_waits_above_the_surest_object(played):
 
 
 def test_a_recording_holds_the_answer_and_is_a_bag_like_any_other(bundle, played):
-    from hooc_perception.replay.bag_reader import BagScene
+    from hooc_perception.io.bags.reader import BagScene
     from mcap.reader import make_reader
     from rosbags.typesys import get_typestore, Stores
     store, last, counts = get_typestore(Stores.ROS2_JAZZY), {}, {}

@@ -5,7 +5,7 @@
 import importlib.util
 from pathlib import Path
 
-from hooc_perception.core.observe import rectify
+from hooc_perception.core.segment.observe import rectify
 from hooc_perception.core.types import DepthView
 import numpy as np
 import pytest
@@ -13,10 +13,10 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray, TransformStamped  # noqa: E402
-from hooc_perception.nodes.ingestion_node import IngestionNode  # noqa: E402
-from hooc_perception.ros import conversions as c  # noqa: E402
-from hooc_perception.ros.point_clouds import cloud_rows  # noqa: E402
-from hooc_perception.ros.qos import qos  # noqa: E402
+from hooc_perception.nodes.ingestion_node import IngestionNode
+from hooc_perception.ros.messages import conversions as c
+from hooc_perception.ros.messages.point_clouds import cloud_rows
+from hooc_perception.ros.qos import qos
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import CameraInfo, PointCloud2  # noqa: E402

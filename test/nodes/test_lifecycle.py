@@ -6,26 +6,26 @@ import gc
 import weakref
 
 from hooc_perception.errors import HoocError
-from hooc_perception.models.derive import derive
-from hooc_perception.models.folder import save_model_folder
+from hooc_perception.objects.derive import derive
+from hooc_perception.trained.folder import save_model_folder
 import numpy as np
 import pytest
 import trimesh
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.core.classify import FORMAT_VERSION, KIND_PAPER  # noqa: E402
-from hooc_perception.nodes import (  # noqa: E402
+from hooc_perception.core.classification.classify import FORMAT_VERSION, KIND_PAPER
+from hooc_perception.nodes import (
     candidate_node,
     classification_node,
     ingestion_node,
     parsing_node,
     replay_node,
 )
-from hooc_perception.nodes.warm_up import overhead_camera  # noqa: E402
-from hooc_perception.ros.misaddressed import misaddressed  # noqa: E402
-from hooc_perception.ros.stage_node import StageConfig, StageNode  # noqa: E402
-from hooc_perception.supervisor.params_file import unreached_sections  # noqa: E402
+from hooc_perception.nodes.warm_up import overhead_camera
+from hooc_perception.ros.lifecycle.misaddressed import misaddressed
+from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.supervisor.params_file import unreached_sections
 from lifecycle_msgs.msg import Transition  # noqa: E402
 from lifecycle_msgs.srv import ChangeState, GetState  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
@@ -113,7 +113,7 @@ def test_a_model_for_another_number_of_cameras_is_refused_at_once(bench, folder)
 
 
 def test_a_stage_without_its_inputs_says_which_node_is_missing(bench, folder, monkeypatch):
-    monkeypatch.setattr('hooc_perception.ros.view_topics.EXPLAIN_AFTER_S', 0.3)
+    monkeypatch.setattr('hooc_perception.ros.inputs.view_topics.EXPLAIN_AFTER_S', 0.3)
     node = bench.add(candidate_node.CandidateNode, model=str(folder.path), warm_up=False)
     node.trigger_configure(), node.trigger_activate()
     assert bench.spin(lambda: 'input' in bench.reasons(node))

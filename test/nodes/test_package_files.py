@@ -21,7 +21,7 @@ def own_config(name):
     own = [value for key, value in vars(module).items()
            if key.endswith('Config') and getattr(value, '__module__', '') == module.__name__]
     return own[0] if own else importlib.import_module(
-        'hooc_perception.ros.stage_node').StageConfig
+        'hooc_perception.ros.lifecycle.stage_node').StageConfig
 
 
 @pytest.mark.parametrize('name', ['perception', 'replay'])
@@ -47,11 +47,11 @@ def test_parameter_file_names_only_declared_parameters(repository):
 
 
 def test_documented_parameters_have_not_drifted(repository):
-    from hooc_perception.ros.document_parameters import documented
+    from hooc_perception.ros.lifecycle.document_parameters import documented
     text = (repository / 'docs' / 'nodes.md').read_text()
     assert text.count('<!-- parameters:') == 8
     assert documented(text) == text, (
-        'run python -m hooc_perception.ros.document_parameters docs/nodes.md')
+        'run python -m hooc_perception.ros.lifecycle.document_parameters docs/nodes.md')
 
 
 def test_every_topic_is_documented(repository):

@@ -8,10 +8,10 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.nodes.replay_node import ReplayNode  # noqa: E402
-from hooc_perception.ros import view_topics  # noqa: E402
-from hooc_perception.ros.conversions import header  # noqa: E402
-from hooc_perception.ros.qos import qos  # noqa: E402
+from hooc_perception.nodes.replay_node import ReplayNode
+from hooc_perception.ros.inputs import view_topics
+from hooc_perception.ros.messages.conversions import header
+from hooc_perception.ros.qos import qos
 from std_msgs.msg import Header  # noqa: E402
 
 # Who waits for an answer for so long has not been told.

@@ -8,9 +8,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.nodes.replay_node import ReplayNode  # noqa: E402
-from hooc_perception.replay.bag_reader import BagScene  # noqa: E402
-from hooc_perception.ros.qos import qos  # noqa: E402
+from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.nodes.replay_node import ReplayNode
+from hooc_perception.ros.qos import qos
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from std_msgs.msg import String  # noqa: E402
 

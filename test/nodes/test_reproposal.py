@@ -14,12 +14,12 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.nodes import candidate_node, parsing_node  # noqa: E402
-from hooc_perception.ros import reproposal  # noqa: E402
-from hooc_perception.ros.conversions import header  # noqa: E402
-from hooc_perception.ros.qos import qos  # noqa: E402
-from hooc_perception.ros.stage_messages import candidates_messages  # noqa: E402
-from hooc_perception.ros.stage_node import StageConfig, StageNode  # noqa: E402
+from hooc_perception.nodes import candidate_node, parsing_node
+from hooc_perception.ros import reproposal
+from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.messages.conversions import header
+from hooc_perception.ros.messages.stages import candidates_messages
+from hooc_perception.ros.qos import qos
 from rclpy.executors import SingleThreadedExecutor  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402
 from std_msgs.msg import String  # noqa: E402

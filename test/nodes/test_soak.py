@@ -7,7 +7,7 @@ import gc
 import importlib.util
 from pathlib import Path
 
-from hooc_perception.core.observe import observe
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.errors import HoocError
 import numpy as np
 import pytest
@@ -15,11 +15,11 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.nodes.ingestion_node import IngestionNode  # noqa: E402
-from hooc_perception.ros import conversions as c  # noqa: E402
-from hooc_perception.ros import view_topics  # noqa: E402
-from hooc_perception.ros.qos import qos  # noqa: E402
-from hooc_perception.supervisor import environment  # noqa: E402
+from hooc_perception.nodes.ingestion_node import IngestionNode
+from hooc_perception.ros.inputs import view_topics
+from hooc_perception.ros.messages import conversions as c
+from hooc_perception.ros.qos import qos
+from hooc_perception.supervisor import environment
 import psutil  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 

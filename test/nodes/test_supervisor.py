@@ -15,8 +15,8 @@ import yaml
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.supervisor import environment  # noqa: E402
-from hooc_perception.supervisor.supervisor import Supervisor  # noqa: E402
+from hooc_perception.supervisor import environment
+from hooc_perception.supervisor.supervisor import Supervisor
 
 PARENT = """
 import signal

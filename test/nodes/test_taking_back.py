@@ -16,16 +16,13 @@ import trimesh
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.core.observe import observe  # noqa: E402
-from hooc_perception.core.types import Energy, ParsedScene  # noqa: E402
-from hooc_perception.nodes import parsing_node  # noqa: E402
-from hooc_perception.nodes.warm_up import made_up_scene  # noqa: E402
-from hooc_perception.ros import conversions as c  # noqa: E402
-from hooc_perception.ros.qos import qos  # noqa: E402
-from hooc_perception.ros.stage_messages import (  # noqa: E402
-    candidates_messages,
-    probabilities_message,
-)
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.types import Energy, ParsedScene
+from hooc_perception.nodes import parsing_node
+from hooc_perception.nodes.warm_up import made_up_scene
+from hooc_perception.ros.messages import conversions as c
+from hooc_perception.ros.messages.stages import candidates_messages, probabilities_message
+from hooc_perception.ros.qos import qos
 from lifecycle_msgs.msg import Transition  # noqa: E402
 from lifecycle_msgs.srv import ChangeState  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
@@ -46,8 +43,8 @@ KINDS = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
 
 SPEAKER = """
 import sys
-from hooc_perception.ros.spin import run_node
-from hooc_perception.ros.stage_node import StageConfig, StageNode
+from hooc_perception.ros.lifecycle.spin import run_node
+from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
 from std_msgs.msg import String
 
 class Speaker(StageNode):

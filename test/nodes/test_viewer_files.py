@@ -10,7 +10,7 @@ import yaml
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.ros.qos import TOPICS  # noqa: E402
+from hooc_perception.ros.qos import TOPICS
 
 DISPLAYS = {'MarkerArray': {'objects/markers'}, 'PoseArray': {'objects/poses'},
             'PointCloud2': {'views/points', 'scene/unexplained'},

@@ -3,7 +3,7 @@
 """The made-up scene is a scene: things stand on a table and are seen."""
 
 from hooc_perception.core.geometry import back_project
-from hooc_perception.core.observe import observe
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import GenericModel
 from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera
 import numpy as np

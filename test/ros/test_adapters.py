@@ -14,11 +14,11 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.core.types import Candidates, Energy, ParsedScene  # noqa: E402
-from hooc_perception.ros.adapters.choose import AdapterConfig, adapters_of  # noqa: E402
-from hooc_perception.ros.adapters.detections import covariance  # noqa: E402
-from hooc_perception.ros.adapters.guard import messages_of  # noqa: E402
-from hooc_perception.ros.found import found_scene, FoundScene  # noqa: E402
+from hooc_perception.core.types import Candidates, Energy, ParsedScene
+from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_of
+from hooc_perception.ros.outputs.adapters.detections import covariance
+from hooc_perception.ros.outputs.adapters.guard import messages_of
+from hooc_perception.ros.outputs.found import found_scene, FoundScene
 import trimesh  # noqa: E402
 
 STAMP = 1_700_000_000_250_000_000
@@ -39,7 +39,7 @@ def stubs(monkeypatch):
 @pytest.fixture
 def scene():
     """Return the FoundScene of a box and a can that lies."""
-    from hooc_perception.models.derive import derive
+    from hooc_perception.objects.derive import derive
     rng = np.random.default_rng(0)
     models = (derive('tea box', trimesh.creation.box((0.1, 0.06, 0.08)), rng, 50, 50),
               derive('can', trimesh.creation.cylinder(0.03, 0.1, sections=8), rng, 50, 50))

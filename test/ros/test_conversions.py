@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
-from hooc_perception.core.observe import rectify
+from hooc_perception.core.segment.observe import rectify
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -13,7 +13,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.ros import conversions as c  # noqa: E402
+from hooc_perception.ros.messages import conversions as c
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 
 

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.ros.parameters import descriptor, Parameters  # noqa: E402
+from hooc_perception.ros.lifecycle.parameters import descriptor, Parameters
 from rclpy.node import Node  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recorded images are paced like live ones."""
 
-from hooc_perception.ros.player import Player, PlayerConfig
+from hooc_perception.ros.outputs.player import Player, PlayerConfig
 import pytest
 
 MS = 1_000_000

@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.core.types import Camera  # noqa: E402
-from hooc_perception.ros import conversions as c  # noqa: E402
-from hooc_perception.ros.raw_frames import FrameRefused, RawFrames  # noqa: E402
+from hooc_perception.core.types import Camera
+from hooc_perception.ros.inputs.raw_frames import FrameRefused, RawFrames
+from hooc_perception.ros.messages import conversions as c
 
 H, W = 24, 32
 HEAD = c.header(0, 'a_optical')

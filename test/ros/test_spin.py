@@ -11,14 +11,14 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.ros.spin import raise_interrupt  # noqa: E402
-from hooc_perception.supervisor.processes import NodeProcess  # noqa: E402
+from hooc_perception.ros.lifecycle.spin import raise_interrupt
+from hooc_perception.supervisor.processes import NodeProcess
 
 HEAD = """
 import sys
 import rclpy.node
 from rclpy.impl.implementation_singleton import rclpy_implementation
-from hooc_perception.ros.spin import run_node
+from hooc_perception.ros.lifecycle.spin import run_node
 """
 SHUT_DOWN = HEAD + """
 def between_two_waits():

@@ -20,9 +20,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.ros import stage_messages as s  # noqa: E402
-from hooc_perception.ros.conversions import header  # noqa: E402
-from hooc_perception.ros.point_clouds import cloud_message, cloud_rows, row_dtype  # noqa: E402
+from hooc_perception.ros.messages import stages as s
+from hooc_perception.ros.messages.conversions import header
+from hooc_perception.ros.messages.point_clouds import cloud_message, cloud_rows, row_dtype
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 
 

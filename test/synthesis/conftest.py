@@ -3,7 +3,7 @@
 """Small models and cameras for the tests of synthetic scenes."""
 
 from hooc_perception.core.types import Camera
-from hooc_perception.models.derive import derive
+from hooc_perception.objects.derive import derive
 from hooc_perception.synthesis.rigs import look_at
 import numpy as np
 import pytest

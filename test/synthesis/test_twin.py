@@ -7,7 +7,7 @@ from hooc_perception.cli.main import main
 from hooc_perception.core.geometry import inverse, transform
 from hooc_perception.core.render import render_depth
 from hooc_perception.errors import HoocError
-from hooc_perception.scenes.scene_set import load_scene_set
+from hooc_perception.io.scenes.scene_set import load_scene_set
 from hooc_perception.synthesis import twin
 from hooc_perception.synthesis.raw_views import Caster, undistorted_rays
 import numpy as np

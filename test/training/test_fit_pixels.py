@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from hooc_perception.core.pixel_forest import centres
+from hooc_perception.core.classification.pixel_forest import centres
 from hooc_perception.core.types import Camera, ObservedView, RectifiedView
 from hooc_perception.training.fit_pixels import fit_view, PixelFitConfig, PixelPool, pool
 import numpy as np

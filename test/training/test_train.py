@@ -5,14 +5,14 @@
 from dataclasses import dataclass
 
 from hooc_perception.cli import main
-from hooc_perception.core.classify import classify
+from hooc_perception.core.classification.classify import classify
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.observe import observe
-from hooc_perception.core.verify import FEATURES, Verifier
+from hooc_perception.core.parsing.verifier import FEATURES, Verifier
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.errors import HoocError
-from hooc_perception.models.folder import load_model_folder
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.synthesis.training_scenes import training_scene
+from hooc_perception.trained.folder import load_model_folder
 from hooc_perception.training import train as module
 from hooc_perception.training.fit_forest import FitConfig
 from hooc_perception.training.fit_pixels import PixelFitConfig

@@ -10,7 +10,7 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.shaded import shaded_picture
 from hooc_perception.evaluation.report.space import Meshes, space_json
-from hooc_perception.scenes.files import write_atomically
+from hooc_perception.io.scenes.files import write_atomically
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 import numpy as np

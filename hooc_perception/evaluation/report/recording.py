@@ -9,7 +9,7 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.page import palette_of
 from hooc_perception.evaluation.report.space import extent_of, seen_points
-from hooc_perception.scenes.files import written_whole
+from hooc_perception.io.scenes.files import written_whole
 import numpy as np
 
 TIMELINE = 'scene'

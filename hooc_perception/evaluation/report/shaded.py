@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Shaded pictures of posed objects on a piece of the table, two of them from one place."""
 
-from hooc_perception.models.shaded import Orbit, render_shaded
+from hooc_perception.objects.shaded import Orbit, render_shaded
 import numpy as np
 
 TABLE_RGB = (214, 207, 194)

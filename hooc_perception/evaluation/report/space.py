@@ -11,7 +11,7 @@ from hooc_perception.evaluation.errors import affine
 from hooc_perception.evaluation.report import pictures
 import numpy as np
 
-# As core.unexplained: a pixel within this distance of the composed objects is explained.
+# As core.parsing.unexplained: a pixel within this distance of the composed objects is explained.
 EXPLAINED_M = 0.02
 MAX_FOREGROUND, MAX_TABLE = 24000, 12000
 BORDER_M = 0.12

@@ -1,0 +1,178 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The cost of a subset of candidates, composed nearest wins, kept up to date flip by flip.
+
+What a search needs from an energy, and all that it needs, is
+
+    n           number of candidates
+    mask        (n,) bool, the subset that is chosen now
+    value       its energy
+    deltas()    (n,) float64, how the energy changes if candidate k flips (joins or leaves);
+                inf where it must not join
+    flip(k)     flip it
+    reset(mask) start again from a subset
+    evaluate(mask)  the energy of any subset, without touching the current one
+
+`Compositor` is the part of such an energy that lives in the images,
+
+    E(S) = sum_i c_i(S) + sum_{k in S} unary_k
+
+where c_i is the cost of the candidate of S that is nearest at pixel i, or the cost of pixel i
+with nothing shown. `Eq1` (eq1.py) adds the overlap of volumes; any other sum of energies is
+added in the same way, see `OverlapTerm` (overlap.py). Nothing here knows geometry: pixels of
+all views are numbered through, and leaving a pixel out is never to name it.
+
+Costs are rounded to multiples of 2^-22 of the greatest one. Sums of such numbers are exact in
+float64, so no drift builds up over millions of flips, `value` equals `evaluate(mask)` to the
+last bit, and equal subsets have equal energies on every machine.
+"""
+
+from hooc_perception.core.energy.kernels import compositor as kernels
+from hooc_perception.errors import HoocError
+import numpy as np
+
+COST_BITS = 22
+
+
+class Compositor:
+    """
+    Pixel and unary costs of subsets of n candidates.
+
+    :param offsets: (n + 1,) integers; entries offsets[k]:offsets[k + 1] belong to candidate k.
+    :param pixel: (E,) integers in 0..P-1; a candidate names a pixel at most once.
+    :param depth: (E,) metres; the smallest wins, ties go to the lower candidate.
+    :param cost: (E,) finite cost of the pixel if this candidate is shown there.
+    :param cost_none: (P,) finite cost of every pixel if no candidate is shown there.
+    :param unary: (n,) cost of each chosen candidate; default 0.
+    :param group: (n,) integers, for instance the category; default one group.
+    :param max_per_group: most chosen candidates a group may have; 0 = no limit. `deltas` is
+        inf where a flip would exceed it; `flip` itself does not refuse.
+    """
+
+    def __init__(self, offsets, pixel, depth, cost, cost_none, unary=None, group=None,
+                 max_per_group=0):
+        """Sort the pixel lists; start from the empty subset. Raise HoocError on bad shapes."""
+        offsets = np.ascontiguousarray(offsets, np.int64)
+        self.n = n = len(offsets) - 1
+        unary = np.zeros(n) if unary is None else np.asarray(unary, np.float64)
+        cost, cost_none = np.asarray(cost, np.float64), np.asarray(cost_none, np.float64)
+        if not len(pixel) == len(depth) == len(cost) == offsets[-1] or len(unary) != n:
+            raise HoocError(f'the pixel lists of {n} candidates disagree in length: pixel '
+                            f'{len(pixel)}, depth {len(depth)}, cost {len(cost)}, unary '
+                            f'{len(unary)}, offsets end at {offsets[-1]}')
+        if not all(np.isfinite(a).all() for a in (cost, cost_none, unary)):
+            raise HoocError('pixel and unary costs must be finite; leave pixels without a '
+                            'reading out of the lists')
+        if len(pixel) and not (0 <= np.min(pixel) and np.max(pixel) < len(cost_none)):
+            raise HoocError(f'a candidate names a pixel outside 0..{len(cost_none) - 1}')
+        greatest = max((np.abs(a).max() for a in (cost, cost_none) if len(a)), default=0.0)
+        quantum = 2.0 ** (np.ceil(np.log2(max(greatest, 1e-30))) - COST_BITS)
+
+        def rounded(costs):
+            return np.round(costs / quantum) * quantum
+
+        # Pixels that no candidate covers cost the same whatever is chosen: summed once.
+        pixel = np.asarray(pixel, np.int64)
+        seen = np.bincount(pixel, minlength=len(cost_none)) > 0
+        self.pixels = used = np.flatnonzero(seen)
+        cost_none = rounded(cost_none)
+        self._unseen = float(cost_none[~seen].sum())
+        self._unary = rounded(unary)
+        owner, slot_cost, self._run, self._entry = kernels.build(
+            offsets, (np.cumsum(seen) - 1)[pixel].astype(np.int32),
+            np.ascontiguousarray(depth, np.float32), rounded(cost).astype(np.float32),
+            cost_none[used].astype(np.float32))
+        (self._kind, self._offsets, self._pixel, self._slot, self._owner, self._cost,
+         self._start) = _merged(self._run, owner, slot_cost, n)
+        self._group = (np.zeros(n, np.int64) if group is None
+                       else np.unique(group, return_inverse=True)[1])
+        self._max_per_group = int(max_per_group)
+        self._active = np.zeros(n + 1, bool)
+        self._active[n] = True
+        self._first, self._second = np.zeros((2, len(self._start) - 1), np.int32)
+        self._nearest = np.zeros(len(self._start) - 1, np.int32)
+        self._deltas = np.zeros(n + 1)
+        self.reset(np.zeros(n, bool))
+
+    @property
+    def mask(self):
+        """Return a copy of the current subset, (n,) bool."""
+        return self._active[:self.n].copy()
+
+    @property
+    def value(self):
+        """Return the energy of the current subset."""
+        return self._pixel_cost + self._unary_cost
+
+    def reset(self, mask):
+        """Start again from the subset `mask` (n,) bool."""
+        self._active[:self.n] = mask
+        self._pixel_cost = self._unseen + kernels.restart(
+            self._active, self._owner, self._cost, self._start, self._first, self._second,
+            self._deltas)
+        self._unary_cost = float(self._unary[self._active[:self.n]].sum())
+        self._count = np.bincount(self._group[self._active[:self.n]],
+                                  minlength=self._group.max(initial=0) + 1)
+
+    def deltas(self, limited=True):
+        """
+        Return (n,) float64: the change of `value` by each flip, inf where not allowed.
+
+        :param limited: False looks past the groups' limit.
+        """
+        active = self._active[:self.n]
+        deltas = self._deltas[:self.n] + np.where(active, -self._unary, self._unary)
+        if limited and self._max_per_group:
+            full = self._count >= self._max_per_group
+            deltas[~active & full[self._group]] = np.inf
+        return deltas
+
+    def flip(self, k):
+        """Let candidate k join the subset, or leave it if it is in."""
+        joins = not self._active[k]
+        self._pixel_cost += self._deltas[k]
+        self._unary_cost += self._unary[k] if joins else -self._unary[k]
+        self._count[self._group[k]] += 1 if joins else -1
+        (kernels.add if joins else kernels.remove)(
+            k, self._offsets, self._pixel, self._slot, self._active, self._owner, self._cost,
+            self._start, self._first, self._second, self._deltas)
+
+    def evaluate(self, mask):
+        """Return the energy of the subset `mask` (n,) bool; the current one stays."""
+        members = np.flatnonzero(mask)
+        return self._unseen + self._unary[members].sum() + kernels.evaluate(
+            members, self._offsets, self._pixel, self._slot, self._start, self._cost,
+            self._nearest)
+
+    def entries_shown(self, mask):
+        """
+        Return (len(self.pixels),) int64: which entry of the lists is seen at each of `pixels`.
+
+        -1 where nothing of the subset `mask` (n,) bool is seen; the current one stays.
+        """
+        kernels.evaluate(np.flatnonzero(mask), self._offsets, self._pixel, self._slot,
+                         self._start, self._cost, self._nearest)
+        place = self._nearest - self._start[:-1]
+        return self._entry[self._run[:-1] + place[self._kind]].astype(np.int64)
+
+    def shown(self):
+        """Return (len(self.pixels),) int32: the candidate shown at each of `pixels`, or -1."""
+        owner = self._owner[self._first][self._kind]
+        return np.where(owner == self.n, -1, owner).astype(np.int32)
+
+
+def _merged(start, owner, cost, n):
+    """Return (kind of each pixel, *arrays of kernels.merge) for runs of slots."""
+    _, example, kind = np.unique(kernels.fingerprints(start, owner), return_index=True,
+                                 return_inverse=True)
+    # Number the kinds as they come in the images: neighbours stay neighbours in memory.
+    order = np.argsort(example)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    kind, example = rank[kind], example[order]
+    same, *merged = kernels.merge(start, owner, cost, n, kind, example)
+    if not same:  # two fingerprints in 2^64 collided: do without merging
+        kind = np.arange(len(kind))
+        same, *merged = kernels.merge(start, owner, cost, n, kind, kind)
+    return kind, *merged

@@ -1,0 +1,169 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Greedy best flip, then iterated local search with flips, swaps and kicks.
+
+It knows no geometry, only the energy's interface in core/energy/compositor.py: n, mask, value,
+deltas(), flip(k) and reset(mask). It can be stopped at any time and then holds the best subset
+seen.
+"""
+
+from dataclasses import dataclass
+
+from hooc_perception.core.config import Config, param
+import numpy as np
+
+# Less than this is the rounding of sums, not a gain.
+TINY = 1e-10
+
+
+@dataclass(frozen=True)
+class LocalSearchConfig(Config):
+    """Parameters of the iterated local search."""
+
+    patience: int = param(
+        30, 'kicks in a row without a gain after which the search has converged; as good as '
+        'long runs in 36 of 36 trials on pools of 125 candidates', low=0)
+    kick: int = param(5, 'most random flips of a kick; each kick draws 1 to this many', low=1)
+    swaps: bool = param(True, 'whether a member may be exchanged for an outsider in one step')
+
+
+@dataclass(frozen=True)
+class SearchResult:
+    """
+    What a search found.
+
+    :ivar mask: (n,) bool, the best subset.
+    :ivar energy: its energy.
+    :ivar converged: False where time ran out.
+    :ivar kicks: number of kicks tried.
+    """
+
+    mask: np.ndarray
+    energy: float
+    converged: bool
+    kicks: int
+
+
+class OutOfTimeError(Exception):
+    """Raised and caught in here when `stop` says that time is up."""
+
+
+def greedy(energy, stop=None):
+    """
+    Flip whatever lowers the energy most until nothing does.
+
+    A member that costs nothing to leave out (nobody sees it) is left out.
+
+    :raises OutOfTimeError: where `stop` says so.
+    """
+    while energy.n:
+        deltas = energy.deltas()
+        k = int(np.argmin(deltas))
+        if deltas[k] >= -TINY:
+            k = int(np.argmin(np.where(energy.mask, deltas, np.inf)))
+            if not energy.mask[k] or deltas[k] > TINY:
+                return
+        energy.flip(k)
+        if stop is not None and stop():
+            raise OutOfTimeError
+
+
+def best_swap(energy, stop=None):
+    """
+    Make the best exchange of one member for one outsider if it lowers the energy.
+
+    :return: whether it did.
+    """
+    best, pair = -TINY, None
+    for a in np.flatnonzero(energy.mask):
+        leaves = energy.deltas()[a]
+        energy.flip(a)
+        deltas = energy.deltas()
+        deltas[a] = np.inf
+        deltas[energy.mask] = np.inf
+        b = int(np.argmin(deltas))
+        if leaves + deltas[b] < best:
+            best, pair = leaves + deltas[b], (a, b)
+        energy.flip(a)
+        if stop is not None and stop():
+            raise OutOfTimeError
+    if pair is None:
+        return False
+    for k in pair:
+        energy.flip(k)
+    return True
+
+
+def descend(energy, config=LocalSearchConfig(), stop=None):
+    """Flip and swap down to a subset that no flip and no swap betters."""
+    while True:
+        greedy(energy, stop)
+        if not config.swaps or not best_swap(energy, stop):
+            return
+
+
+def local_search(energy, rng, config=LocalSearchConfig(), stop=None):
+    """
+    Minimise an energy from its current subset; see the module.
+
+    Each kick flips a few things at random, half of the time members and half of the time
+    outsiders, and lets the others settle; the search goes down from there and comes back
+    unless that is no worse.
+
+    :param stop: callable without arguments that returns True when time is up.
+    :return: SearchResult; the energy is left at the best subset.
+    """
+    best_value, best_mask = energy.value, energy.mask
+    calm = kicks = 0
+    converged = True
+    try:
+        descend(energy, config, stop)
+        best_value, best_mask = energy.value, energy.mask
+        while calm < config.patience and energy.n:
+            calm += 1
+            kicks += 1
+            _kick(energy, rng, config.kick)
+            descend(energy, config, stop)
+            if energy.value < best_value - TINY:
+                calm = 0
+            if energy.value <= best_value + TINY:
+                best_value, best_mask = energy.value, energy.mask
+            else:
+                _go_to(energy, best_mask)
+    except OutOfTimeError:
+        converged = False
+        if energy.value < best_value:
+            best_value, best_mask = energy.value, energy.mask
+    _go_to(energy, best_mask)
+    return SearchResult(best_mask, float(best_value), converged, kicks)
+
+
+def _kick(energy, rng, most):
+    """
+    Flip one to `most` random things, members or outsiders with equal chance.
+
+    The others then settle by best flips while the kicked ones are held: a new member would
+    otherwise be the first to go, before those that it makes superfluous have gone.
+    """
+    held = np.zeros(energy.n, bool)
+    for _ in range(rng.integers(1, most + 1)):
+        mask = energy.mask
+        choice = np.flatnonzero(~held & (mask if rng.random() < .5 else
+                                         ~mask & np.isfinite(energy.deltas())))
+        if len(choice):
+            k = int(rng.choice(choice))
+            held[k] = True
+            energy.flip(k)
+    while energy.n:
+        deltas = np.where(held, np.inf, energy.deltas())
+        k = int(np.argmin(deltas))
+        if deltas[k] >= -TINY:
+            return
+        energy.flip(k)
+
+
+def _go_to(energy, mask):
+    """Flip whatever differs from `mask`."""
+    for k in np.flatnonzero(energy.mask != mask):
+        energy.flip(int(k))

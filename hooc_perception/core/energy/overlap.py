@@ -1,0 +1,176 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Share of an object's volume inside other objects: v_k of Eq. 1, exact for every subset.
+
+Each generic model has 512 fixed samples of its interior and a boolean occupancy grid, both in
+its unit bounding box, so that scaled and posed copies share them. For every pair of candidates
+one bit a sample says whether it lies inside the other one; the union over any subset is then a
+bitwise or, and containment needs no special case. Inside is where the mesh winds around a cell
+(so parts may overlap, and the whole may be inside out). On a surface that is not closed the
+rays along different axes contradict one another: the majority of three decides, and where even
+that disowns the model's own interior points, the space around these counts as its inside.
+That way no category has to be left out (the paper had to leave out dustpan and tray).
+"""
+
+from hooc_perception.core.energy.kernels import overlap as kernels
+from hooc_perception.core.memo import per_model
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+SAMPLES = 512
+CELLS = 48
+# A mesh whose winding grid holds less than this share of its interior points is not closed.
+BELIEVABLE = 0.75
+
+
+@per_model
+def occupancy(model):
+    """
+    Return the (CELLS, CELLS, CELLS) bool grid over the bounding box of a GenericModel.
+
+    Indices run along the model's x, y, z; a cell is True where its centre is inside.
+    """
+    cells, extents = CELLS, np.maximum(model.extents, 1e-9)
+    vertices = np.ascontiguousarray((model.vertices / extents + 0.5) * cells)
+    votes = np.zeros((cells, cells, cells), np.uint8)
+    for axis in range(3):
+        winding = np.zeros(votes.shape, np.int16)
+        kernels.wind(vertices, model.faces, axis, cells, winding)
+        votes += winding != 0
+    grid = votes >= 2
+    points = np.asarray(model.interior_points, np.float64)
+    if len(points):
+        at = np.clip(((points / extents + 0.5) * cells).astype(int), 0, cells - 1)
+        if grid[tuple(at.T)].mean() < BELIEVABLE:
+            reach = (max(model.volume, 1e-12) / len(points)) ** (1 / 3)
+            centres = (np.stack(np.meshgrid(*[np.arange(cells) + 0.5] * 3, indexing='ij'), -1)
+                       / cells - 0.5) * extents
+            grid = cKDTree(points).query(centres.reshape(-1, 3), workers=1,
+                                         distance_upper_bound=reach)[0] < np.inf
+            grid = grid.reshape(votes.shape)
+    return grid
+
+
+def interior_samples(model, count=SAMPLES):
+    """
+    Return (count, 3) float64 interior samples in the unit bounding box, centred at 0.
+
+    Evenly picked from `interior_points`, repeated where these are fewer; a model without any
+    volume is represented by its surface.
+    """
+    points = model.interior_points if len(model.interior_points) else model.surface_points
+    points = np.asarray(points, np.float64) / np.maximum(model.extents, 1e-9)
+    if len(points) >= count:
+        return points[np.linspace(0, len(points) - 1, count).astype(int)]
+    return np.resize(points, (count, 3))
+
+
+class OverlapTerm:
+    """
+    The sum of v_k over the objects of a subset, kept up to date flip by flip.
+
+    It has what a search needs (see compositor.py); `value` and `deltas()` are in shares of
+    a volume, so a weighted sum with a Compositor is one more energy.
+
+    :param objects: Candidates; class id c is models[c - 1].
+    :param count: samples of each interior, a multiple of 64.
+    """
+
+    def __init__(self, objects, models, count=SAMPLES):
+        """Compare all pairs whose bounding boxes meet; start from the empty subset."""
+        self.n = n = len(objects)
+        self._count = count
+        self._active = np.zeros(n, bool)
+        classes, row = np.unique(objects.category, return_inverse=True)
+        samples = np.zeros((len(classes), count, 3))
+        grids = np.zeros((len(classes), CELLS, CELLS, CELLS), bool)
+        for i, c in enumerate(classes):
+            samples[i] = interior_samples(models[c - 1], count)
+            grids[i] = occupancy(models[c - 1])
+        R = (Rotation.from_quat(objects.rotation_xyzw).as_matrix() if n
+             else np.zeros((0, 3, 3)))
+        size = np.maximum(objects.size.astype(np.float64), 1e-9)
+        pairs = _meeting_pairs(R, objects.translation, size)
+        bits = np.zeros((len(pairs), count // 64), np.uint64)
+        kernels.sample_bits(pairs, row.astype(np.int32), R, objects.translation, size, samples,
+                            grids, bits)
+        # Keep pairs with a common volume, both directions, ordered by the first.
+        mirror = np.lexsort((pairs[:, 0], pairs[:, 1]))
+        kept = bits.any(1) | bits[mirror].any(1)
+        self._other = pairs[kept, 1]
+        self._bits = bits[kept]
+        self._start = np.searchsorted(pairs[kept, 0], np.arange(n + 1))
+        self._reverse = np.lexsort((pairs[kept, 0], pairs[kept, 1]))
+        self._union, self._once = np.zeros((2, n, count // 64), np.uint64)
+        self.reset(self._active)
+
+    @property
+    def mask(self):
+        """Return a copy of the current subset, (n,) bool."""
+        return self._active.copy()
+
+    @property
+    def value(self):
+        """Return the sum of v_k over the current subset."""
+        return self._covered / self._count
+
+    def reset(self, mask):
+        """Start again from the subset `mask` (n,) bool."""
+        self._active[:] = mask
+        self._covered = kernels.cover_all(self._start, self._other, self._bits, self._active,
+                                          self._union, self._once)
+
+    def deltas(self):
+        """Return (n,) float64: the change of `value` by each flip."""
+        deltas = np.zeros(self.n, np.int64)
+        kernels.flip_deltas(self._start, self._other, self._reverse, self._bits, self._active,
+                            self._union, self._once, deltas)
+        return deltas / self._count
+
+    def flip(self, k):
+        """Let object k join the subset, or leave it if it is in."""
+        self._covered = self._covered + kernels.flip_delta(
+            k, self._start, self._other, self._reverse, self._bits, self._active, self._union,
+            self._once)
+        kernels.flip(k, self._start, self._other, self._bits, self._active, self._union,
+                     self._once)
+
+    def shares(self, mask):
+        """Return (m,) float64: v_k of each member of the subset `mask` (n,) bool."""
+        members = np.flatnonzero(mask)
+        counts = np.zeros(len(members), np.int64)
+        kernels.covered(members, np.asarray(mask, bool), self._start, self._other, self._bits,
+                        counts)
+        return counts / self._count
+
+    def evaluate(self, mask):
+        """Return the sum of v_k over the subset `mask` (n,) bool; the current one stays."""
+        return float(self.shares(mask).sum())
+
+
+def _meeting_pairs(R, translation, size):
+    """Return (m, 2) int32 ordered pairs, both directions, whose world boxes and spheres meet."""
+    half = 0.5 * np.einsum('nij,nj->ni', np.abs(R), size)
+    radius = 0.5 * np.linalg.norm(size, axis=1)
+    apart = np.abs(translation[:, None] - translation[None])
+    meet = ((apart < half[:, None] + half[None]).all(-1)
+            & (np.linalg.norm(apart, axis=-1) < radius[:, None] + radius[None]))
+    np.fill_diagonal(meet, False)
+    return np.argwhere(meet).astype(np.int32)
+
+
+def pairwise(objects, models):
+    """Return (n, n) float64: share of the volume of row k inside object j; 0 on the diagonal."""
+    term = OverlapTerm(objects, models)
+    shares = np.zeros((term.n, term.n))
+    for k in range(term.n):
+        run = slice(term._start[k], term._start[k + 1])
+        shares[k, term._other[run]] = np.bitwise_count(term._bits[run]).sum(1) / SAMPLES
+    return shares
+
+
+def union_shares(objects, models, count=SAMPLES):
+    """Return (n,) float64: share of each object's volume inside any of the others."""
+    return OverlapTerm(objects, models, count).shares(np.ones(len(objects), bool))

@@ -1,0 +1,161 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+How far off an object of the answer may be, from what its pixels say of its pose and size.
+
+Least squares know it: pose and size are as sure as the pixels change while the object moves,
+over the residual that remains. A plate half hidden leaves its centre open, a box whose far
+side nobody sees its depth. What no pixel tells, that real objects differ from generic models,
+grows with the object. Then every half turn about the model's axes is refined: one that costs
+hardly more may be the true one. All of it was calibrated on synthetic scenes (docs/planners.md
+says how well it holds).
+"""
+
+from hooc_perception.core.frame.evidence import hypotheses_of
+from hooc_perception.core.frame.kernels import compare as stat
+from hooc_perception.core.frame.workspace import workspace_of
+from hooc_perception.core.parsing.search import weights_of
+from hooc_perception.core.symmetry import half_turns, is_ball
+import numpy as np
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+# How far an object is moved to see what its pixels say: a pixel of a Kinect covers 3 mm.
+STEP_M = 0.003
+POLISH_STEPS, POLISH_SIGMAS = 20, (0.005, 0.06, 0.04)
+# What is known without the images: metres, radians, log scale.
+PRIOR = (0.05, 0.5, 0.12)
+# Calibrated on three twins (27 scenes, 274 objects) other than those of the docs: 68 % of the
+# errors lie within sigma, of the surest quarter of the objects as of the least sure. HEAT: pixels
+# that say as much as one alone, where the residual is TYPICAL_M: neighbours err alike.
+HEAT, TYPICAL_M, LEAST_M = 300.0, 0.003, 0.0015
+SHAPE = 0.06                # error from the shape of the object, share of its longest side
+PER_SQUARE_M, SCALE_R = 28.2, 0.44
+# A half turn whose cost rises by this share of the object's pixels is as likely as the answer; the
+# odds fall by e for every WIDTH more.
+FLIP_EVEN, FLIP_WIDTH = 0.02, 0.012
+WITHIN = 0.68
+
+
+def pose_uncertainty(observation, probabilities, parsed, models, config, rng):
+    """
+    Return (sigma_t (n,), sigma_r (n,)) float32 of the objects of a ParsedScene.
+
+    sigma_t, metres: 68 % of the centres lie within it of the true one. sigma_r, radians: the
+    same of the rotation up to the model's symmetry; pi where a half turn is so likely that less
+    would not do; NaN for a ball. Both take the category for granted.
+
+    :param config: ParseConfig, whose costs are used.
+    """
+    objects = parsed.objects
+    n = len(objects)
+    if not n:
+        return np.zeros((2, 0), np.float32)
+    space = workspace_of(observation, probabilities, models)
+    cost = _Cost(space.coarse, objects, models, config)
+    longest = np.array([models[c - 1].longest_side for c in objects.category])
+    information = _information(cost, longest)
+    flipped = _flip_probabilities(cost, objects, models, rng)
+    out = np.full((2, n), np.nan, np.float32)
+    for k in range(n):
+        half = longest[k] / 2
+        units = np.repeat([1.0, half, half], 3)     # metres at the surface
+        heat = HEAT * (max(float(parsed.residual_m[k]), LEAST_M) / TYPICAL_M) ** 2
+        covariance = np.linalg.inv(information[k] / heat + np.diag(
+            (np.repeat(PRIOR, 3) * units) ** -2.0))
+        # Errors spread wider than least squares think: sigma goes with the variance.
+        variance = np.trace(covariance[:3, :3]) + (SHAPE * longest[k]) ** 2
+        out[0, k] = min(PER_SQUARE_M * variance, longest[k])
+        symmetry = models[int(objects.category[k]) - 1].symmetry
+        if is_ball(symmetry):
+            continue
+        turning = covariance[3:6, 3:6]
+        for axis in np.flatnonzero(np.asarray(symmetry) == 0):
+            along = Rotation.from_quat(objects.rotation_xyzw[k]).as_matrix()[:, axis]
+            across = np.eye(3) - np.outer(along, along)
+            turning = across @ turning @ across
+        if 1 - flipped[k] <= WITHIN:
+            out[1, k] = np.pi
+        else:
+            local = SCALE_R * np.sqrt(np.trace(turning)) / half
+            out[1, k] = min(np.pi, local * _wider(flipped[k]))
+    return out
+
+
+class _Cost:
+    """The cost of the scene with one object posed and sized otherwise."""
+
+    def __init__(self, evidence, objects, models, config):
+        """Compose the answer."""
+        self.evidence, self.config = evidence, config
+        self.weights = weights_of(config)
+        self.H = hypotheses_of(objects, models)
+        self.category = objects.category.astype(np.int64)
+        _, lists = evidence.explain(self.H, self.category, self.weights, lists=True)
+        self.context = evidence.compose(np.arange(len(objects)), lists)
+
+    def of(self, H, own):
+        """Return (m,) costs in pixels of the full images, and (m,) pixels that are shown."""
+        stats = self.evidence.explain(H, self.category[own], self.weights, self.context, me=own)
+        prior = self.config.size_prior * (np.log(H[:, 7:10]) ** 2).sum(1)
+        shown = stats[:, stat.SHOWN] / self.evidence.scale
+        return (stats[:, stat.DELTA] / self.evidence.scale
+                + shown * (self.config.complexity + prior)), shown
+
+    def polished(self, H, own, rng):
+        """Return hypotheses refined for some steps, each in place of its object."""
+        c = self.config
+        return self.evidence.polish(H, self.category[own], own, self.context, self.weights,
+                                    c.complexity, c.size_prior, POLISH_STEPS, POLISH_SIGMAS, rng)
+
+
+def _wider(p_flip):
+    """Return the factor that makes WITHIN of all errors out of WITHIN of those without a flip."""
+    return np.sqrt(chi2.ppf(WITHIN / (1 - p_flip), 3) / chi2.ppf(WITHIN, 3))
+
+
+def _information(cost, longest):
+    """
+    Return (n, 9, 9), what the pixels say of pose and size: the sum of J J', in 1 / square metres.
+
+    J is the change of a pixel's signed residual, in tolerances and at most 1, while the object
+    moves, turns and grows by STEP_M at its surface, there and back. At outlines pixels change
+    hands, which counts as much as a tolerance.
+    """
+    n, evidence, tolerance = len(longest), cost.evidence, cost.weights.tolerance_m
+    moves = np.concatenate([np.eye(9), -np.eye(9)]) * STEP_M
+    own = np.repeat(np.arange(n), len(moves))
+    flat = np.tile(moves, (n, 1))
+    H, half = cost.H[own], longest[own, None] / 2
+    H[:, :3] += flat[:, :3]
+    H[:, 3:7] = (Rotation.from_rotvec(flat[:, 3:6] / half)
+                 * Rotation.from_quat(H[:, 3:7])).as_quat()
+    H[:, 7:10] *= np.exp(flat[:, 6:9] / half)
+    _, lists = evidence.explain(H, cost.category[own], cost.weights, cost.context, True, own)
+    residual = np.clip((lists.depth - evidence.depth[lists.pixel]) / tolerance, -1, 1)
+    out = np.zeros((n, 9, 9))
+    for k in range(n):
+        first, last = lists.offsets[18 * k], lists.offsets[18 * (k + 1)]
+        pixels, at = np.unique(lists.pixel[first:last], return_inverse=True)
+        # Without the object the table is seen: too far for foreground, right for all else.
+        r = np.tile(evidence.foreground[pixels].astype(float), (18, 1))
+        move = np.repeat(np.arange(18), np.diff(lists.offsets[18 * k:18 * (k + 1) + 1]))
+        r[move, at] = residual[first:last]
+        J = (r[:9] - r[9:]) / (2 * STEP_M)
+        out[k] = J @ J.T / evidence.scale
+    return out
+
+
+def _flip_probabilities(cost, objects, models, rng):
+    """Return (n,) how likely a half turn of the answer is the true orientation."""
+    turned, rows = half_turns(objects, models)
+    H = np.concatenate([cost.H, hypotheses_of(turned, models)])
+    own = np.concatenate([np.arange(len(objects)), rows])
+    costs, shown = cost.of(cost.polished(H, own, rng), own)
+    out, n = np.zeros(len(objects)), len(objects)
+    for k in range(n):
+        others = np.flatnonzero(own[n:] == k) + n
+        if len(others):
+            rise = (costs[others].min() - costs[k]) / max(shown[k], 1.0)
+            out[k] = 1 / (1 + np.exp((rise - FLIP_EVEN) / FLIP_WIDTH))
+    return out

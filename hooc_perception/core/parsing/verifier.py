@@ -1,0 +1,147 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Stage 4, last step: whether each candidate is what it says it is.
+
+The joint energy compares explanations of a scene; it does not know that a fork is seldom seen
+well or that a can is often taken for a glass. A small forest, learned from parsed synthetic
+scenes alone (training/fit_verifier.py), gives every candidate in the running the probability
+that it is right, from how it fits, what the classifier says, and what the energy would pay for
+doing without it.
+"""
+
+from hooc_perception.core.classification.forest import Forest
+from hooc_perception.core.frame.kernels import compare as kernel
+from hooc_perception.core.frame.kernels.pixel_lists import opinions
+from hooc_perception.errors import HoocError
+import numpy as np
+
+FEATURES = (
+    'margin', 'margin a pixel', 'category margin', 'log pixels', 'agree', 'behind', 'violate',
+    'missing', 'gain', 'cosine', 'residual', 'share', 'unlikeliness', 'delta', 'scale',
+    'largest scale', 'spread of scale', 'height', 'views', 'foreground', 'own p', 'rank of p',
+    'p against best', 'classes', 'log generic area', 'slimness', 'category')
+
+
+class Verifier:
+    """
+    The probability that a candidate is right.
+
+    :param forest: Forest over FEATURES with two classes, wrong and right.
+    """
+
+    def __init__(self, forest):
+        """Wrap a forest."""
+        self.forest = forest
+
+    @staticmethod
+    def from_arrays(classifier):
+        """
+        Return the Verifier of a classifier's arrays, None where training made none.
+
+        :raises HoocError: where it asks for other features than this version computes.
+        """
+        if 'verifier_feature' not in classifier:
+            return None
+        forest = Forest.from_arrays(classifier, 'verifier_')
+        if (forest.feature.max() >= len(FEATURES) or forest.leaf_p.shape[1] != 2
+                or int(classifier.get('verifier_features', 0)) != len(FEATURES)):
+            raise HoocError('the verifier of the model does not fit this version; train again')
+        return Verifier(forest)
+
+    def probability(self, x):
+        """Return (n,) float64 for feature rows x (n, FEATURES) float32."""
+        return self.forest.predict(x)[:, 1].astype(np.float64)
+
+
+def margins(energy, siblings):
+    """
+    Return (n,) float64: what the thing that each candidate stands for is worth, in pixels.
+
+    Least energy with the candidate minus least energy without it and without its siblings,
+    other candidates for the same thing. One exchange may make up for the change, which is what
+    a local optimum leaves to gain. Negative: the scene is explained worse without that thing.
+
+    :param energy: JointEnergy at its optimum; it is left there.
+    :param siblings: (n, n) bool, symmetric, True on the diagonal.
+    """
+    members = np.flatnonzero(energy.mask)
+    joining = np.where(energy.mask, 0.0, energy.joining_costs())
+    leave = energy.deltas()[members]
+    without = np.full(energy.n, -np.inf)
+    for i, a in enumerate(members):
+        energy.flip(a)
+        swapped = leave[i] + energy.deltas()
+        energy.flip(a)
+        swapped[members] = np.inf
+        joining = np.minimum(joining, swapped)
+        replaced = np.where(siblings[a], np.inf, swapped).min(initial=leave[i])
+        without[siblings[a]] = np.maximum(without[siblings[a]], replaced)
+    joining[members] = 0.0
+    return joining - np.where(np.isfinite(without), without, 0.0)
+
+
+def siblings_of(pool, models):
+    """Return (n, n) bool: same category, centres within 0.35 of the model's longest side."""
+    reach = 0.35 * np.array([models[c - 1].longest_side for c in pool.category])
+    apart = np.linalg.norm(pool.translation[:, None] - pool.translation[None], axis=2)
+    return (pool.category[:, None] == pool.category[None]) & (apart < reach[:, None])
+
+
+def features(evidence, pool, stats, lists, models, energy):
+    """
+    Return (n, FEATURES) float32 of all candidates of a pool.
+
+    :param stats: (n, STATS) of the pool alone in the images, `lists` its PixelLists.
+    :param energy: JointEnergy of the pool at its optimum.
+    """
+    n = len(pool)
+    if not n:
+        return np.zeros((0, len(FEATURES)), np.float32)
+    margin = margins(energy, siblings_of(pool, models)) / evidence.scale
+    shown = np.maximum(stats[:, kernel.SHOWN], 1)
+    agree = np.maximum(stats[:, kernel.AGREE], 1)
+    extents = np.array([models[c - 1].extents for c in pool.category])
+    scale = np.log(pool.size / np.maximum(extents, 1e-9))
+    p, foreground = _opinions(evidence, lists, n)
+    own = p[np.arange(n), pool.category]
+    rest = p[:, 1:].copy()
+    rest[np.arange(n), pool.category.astype(int) - 1] = 0
+    rival = rest.max(1)
+    ordered = np.sort(extents, 1)
+    area = ordered[:, 2] * ordered[:, 1]
+    columns = (
+        np.sign(margin) * np.log1p(np.abs(margin) / 10), margin * evidence.scale / (shown + 50),
+        _category_margin(margin, pool.category), np.log(shown / evidence.scale),
+        stats[:, kernel.AGREE] / shown, stats[:, kernel.BEHIND] / shown,
+        stats[:, kernel.VIOLATE] / shown, stats[:, kernel.MISSING] / shown,
+        stats[:, kernel.GAIN] / agree, stats[:, kernel.COS] / agree,
+        stats[:, kernel.RESIDUAL] / agree, stats[:, kernel.SHARE],
+        stats[:, kernel.UNLIKELINESS] / agree, stats[:, kernel.DELTA] / shown,
+        scale.mean(1), np.abs(scale).max(1), np.ptp(scale, axis=1), pool.translation[:, 2],
+        stats[:, kernel.VIEWS], foreground, own, (rest > own[:, None]).sum(1),
+        np.log((own + 0.01) / (rival + 0.01)), np.full(n, p.shape[1] - 1), np.log(area),
+        ordered[:, 2] / np.maximum(ordered[:, 0], 1e-4), pool.category)
+    return np.column_stack(columns).astype(np.float32)
+
+
+def _category_margin(margin, category):
+    """Return (n,) each candidate's log-like distance to the best other one of its category."""
+    out = np.zeros(len(margin))
+    for c in np.unique(category):
+        mine = np.flatnonzero(category == c)
+        order = mine[np.argsort(margin[mine], kind='stable')]
+        first = margin[order[0]]
+        second = margin[order[1]] if len(order) > 1 else first + 1e3
+        out[mine] = margin[mine] - first
+        out[order[0]] = first - second
+    return np.sign(out) * np.log1p(np.abs(out) / 10)
+
+
+def _opinions(evidence, lists, n):
+    """Return ((n, N + 1) mean class probabilities, (n,) share of foreground) of the pixels."""
+    p, front = np.zeros((n, evidence.p.shape[1])), np.zeros(n)
+    opinions(lists.offsets, lists.pixel, evidence.p_row, evidence.p, evidence.foreground, p,
+             front)
+    covered = np.maximum(np.diff(lists.offsets), 1)
+    return p, front / covered

@@ -1,0 +1,139 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Read and write results files, format `hooc-results/1` (docs/scene_sets.md)."""
+
+import json
+import math
+
+from hooc_perception.errors import HoocError
+from hooc_perception.io.scenes import files
+import numpy as np
+
+FORMAT = 'hooc-results/1'
+_TERMS = ('total', 'depth', 'probability', 'overlap')
+
+
+def scene_result(name, parsed, category_names, seconds, **extra):
+    """
+    Return the dict of one scene in a results file.
+
+    :param parsed: ParsedScene.
+    :param category_names: names of the class ids 1..N.
+    :param seconds: from the last depth image's arrival to the answer.
+    :param extra: more entries of this scene, such as `world` of a Scene or a seed.
+    """
+    energy = {term: _finite(getattr(parsed.energy, term)) for term in _TERMS}
+    found = parsed.objects
+    sigmas = {name: getattr(parsed, name) for name in ('sigma_t', 'sigma_r')
+              if getattr(parsed, name, None) is not None}
+    objects = []
+    for i in range(len(found)):
+        objects.append({
+            'category': category_names[int(found.category[i]) - 1],
+            'score': _finite(found.score[i]),
+            'translation': np.asarray(found.translation[i], np.float64).tolist(),
+            'rotation_xyzw': np.asarray(found.rotation_xyzw[i], np.float64).tolist(),
+            'size': np.asarray(found.size[i], np.float64).tolist(),
+            'visible_ratio': _finite(parsed.visible_ratio[i]),
+            'residual_m': _finite(parsed.residual_m[i]),
+            'energy_delta': _finite(parsed.energy_delta[i]),
+            'n_views': int(parsed.n_views[i]),
+            **{name: _finite(sigma[i]) for name, sigma in sigmas.items()}})
+    return {'scene': name, 'seconds': float(seconds), 'energy': energy, 'objects': objects,
+            'converged': bool(parsed.converged),
+            'stage_seconds': {stage: float(s) for stage, s in parsed.seconds.items()}, **extra}
+
+
+def write_results(path, dataset, scenes, **extra):
+    """
+    Write a results file in one move: a reader never sees half of it.
+
+    :param scenes: dicts as `scene_result` makes them.
+    :param extra: more entries at the top, such as profile and seed.
+    :raises HoocError: where an entry breaks the format; nothing is written then.
+    """
+    content = {'format': FORMAT, 'dataset': dataset, **extra, 'scenes': list(scenes)}
+    _check(content, str(path))
+    files.write_atomically(path, json.dumps(content, indent=1, allow_nan=False) + '\n')
+
+
+def load_results(path):
+    """
+    Return the checked content of a results file; entries that we do not know are kept.
+
+    :raises HoocError: one sentence that names file, scene and field.
+    """
+    content = files.read_json(path)
+    _check(content, str(path))
+    return content
+
+
+def scenes_in_common(results, names, results_path, place):
+    """
+    Return ({scene: entry} of the scenes that a set holds, what the others are in words or '').
+
+    :param results: content of a results file; `names`: the set's scenes.
+    :param place: names the set in the error.
+    :raises HoocError: where there is no scene in common.
+    """
+    entries = {entry['scene']: entry for entry in results['scenes']}
+    common = {name: entry for name, entry in entries.items() if name in names}
+    if not common:
+        raise HoocError(f'{results_path} and {place} have no scene in common; '
+                        'give the set that the results are of')
+    others = [name for name in entries if name not in names]
+    if not others:
+        return common, ''
+    return common, (f'{"scene" if len(others) == 1 else "scenes"} {", ".join(others[:5])}'
+                    f'{" and more" if len(others) > 5 else ""} '
+                    f'{"is" if len(others) == 1 else "are"}')
+
+
+def _check(content, path):
+    """Raise HoocError where a results file breaks the format."""
+    if files.required(content, 'format', f'{path}:') != FORMAT:
+        raise HoocError(f'{path}: format is {files.shown(content["format"])}; this version reads '
+                        f'{FORMAT!r}, so write the results again')
+    files.text(files.required(content, 'dataset', f'{path}:'), f'{path}: dataset')
+    scenes = files.sequence(files.required(content, 'scenes', f'{path}:'), f'{path}: scenes')
+    names = []
+    for i, scene in enumerate(scenes):
+        scene = files.mapping(scene, f'{path}: scenes[{i}]')
+        names.append(files.text(files.required(scene, 'scene', f'{path}: scenes[{i}]:'),
+                                f'{path}: scenes[{i}] scene'))
+        _check_scene(scene, f'{path}: scene {names[-1]}:')
+    files.unique(names, f'{path}: scenes')
+
+
+def _check_scene(scene, where):
+    """Check one scene's entry; `where` names file and scene."""
+    if files.number(files.required(scene, 'seconds', where), f'{where} seconds') < 0:
+        raise HoocError(f'{where} seconds is negative; give the time that the scene took')
+    if scene.get('energy') is not None:
+        energy = files.mapping(scene['energy'], f'{where} energy')
+        for term in _TERMS:
+            value = files.required(energy, term, f'{where} energy')
+            if value is not None:
+                files.number(value, f'{where} energy {term}')
+    objects = files.sequence(files.required(scene, 'objects', where), f'{where} objects')
+    for i, item in enumerate(objects):
+        at = f'{where} objects[{i}]'
+        item = files.mapping(item, at)
+        files.text(files.required(item, 'category', at), f'{at} category')
+        if item.get('score') is not None:
+            files.number(item['score'], f'{at} score')
+        files.numbers(files.required(item, 'translation', at), 3, f'{at} translation')
+        quaternion = files.numbers(files.required(item, 'rotation_xyzw', at), 4,
+                                   f'{at} rotation_xyzw')
+        if abs(np.linalg.norm(quaternion) - 1) > 1e-3:
+            raise HoocError(f'{at} rotation_xyzw has length {np.linalg.norm(quaternion):.6g}; '
+                            'give a unit quaternion [x, y, z, w]')
+        size = files.numbers(files.required(item, 'size', at), 3, f'{at} size')
+        if size.min() < 0:
+            raise HoocError(f'{at} size is {size.tolist()}; give three lengths in metres')
+
+
+def _finite(value):
+    """Return a float, None where it is not finite: JSON has no NaN."""
+    value = float(value)
+    return value if math.isfinite(value) else None

@@ -1,0 +1,205 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Read and write scene sets, format `hooc-scenes/1` (docs/scene_sets.md); BOP is read too."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from hooc_perception.chain import check_categories
+from hooc_perception.core.types import Camera
+from hooc_perception.errors import HoocError
+from hooc_perception.io.scenes import camera_files, files
+from hooc_perception.io.scenes.bop import is_bop, load_bop
+from hooc_perception.io.scenes.nominal_table import nominal_cameras
+from hooc_perception.io.scenes.scene import Category, Scene, TrueObject
+from hooc_perception.io.scenes.truth import true_object
+from hooc_perception.io.scenes.writer import FORMAT, NewScene, write_scene_set
+
+# Class ids and instance labels travel as 8-bit images in which 0 is the background.
+MAX_CATEGORIES = 255
+# The world_frame of sets whose poses are not in a table's frame.
+UNKNOWN_WORLD = 'unknown'
+
+__all__ = ['Category', 'NewScene', 'Scene', 'SceneSet', 'TrueObject', 'load_scene_set',
+           'write_scene_set']
+
+
+@dataclass(frozen=True, eq=False)
+class SceneSet:
+    """
+    A folder of scenes, the categories that may stand in them, and the cameras that saw them.
+
+    :ivar world_frame: name of the frame of all poses; z up, z = 0 is the table top.
+    :ivar categories: tuple of Category; class id c is categories[c - 1].
+    :ivar cameras: tuple of Camera: the set's, or those of its first scene.
+    :ivar max_instances: objects of one category that a scene may hold, 0 = no limit.
+    :ivar scenes: tuple of Scene, sorted by name; their depth is read when asked for.
+    """
+
+    path: Path
+    name: str
+    world_frame: str
+    categories: tuple
+    cameras: tuple[Camera, ...]
+    max_instances: int
+    scenes: tuple
+
+    @property
+    def category_names(self):
+        """Return the names in the order of the class ids 1..N."""
+        return tuple(category.name for category in self.categories)
+
+    def scene(self, name):
+        """Return one scene by name; raise HoocError where there is none."""
+        for scene in self.scenes:
+            if scene.name == name:
+                return scene
+        known = ', '.join(scene.name for scene in self.scenes[:20])
+        raise HoocError(f'{self.path}: there is no scene {name!r}; choose one of {known}')
+
+    def selected(self, names):
+        """Return a set with these scenes only, each once, in this order (no `names`: all)."""
+        if not names:
+            return self
+        return replace(self, scenes=tuple(self.scene(name) for name in dict.fromkeys(names)))
+
+
+def load_scene_set(path, with_scenes=True):
+    """
+    Return the SceneSet of a `hooc-scenes/1` folder or of a BOP dataset, whichever it is.
+
+    :param with_scenes: False reads models and cameras only, as training must; the set's
+        `scenes` are empty then, and where the table is not known it is a nominal one
+        (nominal_table.py), for nothing but camera files is opened.
+    :raises HoocError: one sentence that names file, field and mend. Depth images are looked
+        at no sooner than their scene's `depth()` is called.
+    """
+    path = Path(path)
+    if not path.is_dir():
+        raise HoocError(f'{path}: there is no such folder; give a scene set or a BOP dataset')
+    if not (path / 'dataset.yaml').is_file() and is_bop(path):
+        name, categories, cameras, scenes = load_bop(path, with_scenes)
+        return SceneSet(path, name, 'table', categories, cameras, 0, scenes)
+    return _load_hooc(path, with_scenes)
+
+
+def _load_hooc(path, with_scenes):
+    """Return the SceneSet of a `hooc-scenes/1` folder."""
+    file = path / 'dataset.yaml'
+    entry = files.read_yaml(file)
+    if files.required(entry, 'format', f'{file}:') != FORMAT:
+        raise HoocError(f'{file}: format is {files.shown(entry["format"])}; this version reads '
+                        f'{FORMAT!r}, so convert the set or correct the field')
+    categories = _categories(path, file, entry)
+    camera_names = files.unique(
+        [files.ros_token(name, f'{file}: cameras') for name in
+         files.sequence(files.required(entry, 'cameras', f'{file}:'), f'{file}: cameras')],
+        f'{file}: cameras')
+    if not camera_names:
+        raise HoocError(f'{file}: cameras is empty; name at least one camera')
+    unit = files.number(entry.get('depth_unit', 0.001), f'{file}: depth_unit')
+    if not 1e-6 <= unit <= 0.1:
+        raise HoocError(f'{file}: depth_unit is {unit:g}; give the metres of one count, '
+                        '0.001 for millimetres')
+    limit = files.whole(entry.get('max_instances_per_category', 0), 0, 1000,
+                        f'{file}: max_instances_per_category')
+    known = path / 'cameras.yaml'
+    set_cameras = camera_files.load_cameras(known) if known.is_file() else {}
+    world = files.name(entry.get('world_frame', 'table'), f'{file}: world_frame')
+    own = bool(set_cameras) and world != UNKNOWN_WORLD
+    folders = _scene_folders(path, needed=with_scenes or not set_cameras)
+    scenes = tuple(_scene(folder, camera_names, set_cameras, unit, categories, world, path)
+                   for folder in (folders if with_scenes else ()))
+    if own:
+        cameras = _chosen(camera_names, set_cameras, known, file)
+    elif with_scenes:
+        cameras = scenes[0].cameras
+    elif set_cameras:
+        cameras = nominal_cameras(_chosen(camera_names, set_cameras, known, file))
+    else:
+        cameras = _scene_cameras(folders[0], camera_names, {}, path)
+        cameras = nominal_cameras(cameras) if world == UNKNOWN_WORLD else cameras
+    return SceneSet(path, files.name(entry.get('name', path.resolve().name), f'{file}: name'),
+                    'table' if world == UNKNOWN_WORLD else world, categories, cameras, limit,
+                    scenes)
+
+
+def _categories(path, file, entry):
+    """Return the categories of dataset.yaml, in the order of their class ids."""
+    entries = files.sequence(files.required(entry, 'categories', f'{file}:'),
+                             f'{file}: categories')
+    if not 1 <= len(entries) <= MAX_CATEGORIES:
+        raise HoocError(f'{file}: categories has {len(entries)} entries; '
+                        f'give 1 to {MAX_CATEGORIES}')
+    result = []
+    for i, item in enumerate(entries):
+        where = f'{file}: categories[{i}]'
+        item = files.mapping(item, where)
+        name = files.name(files.required(item, 'name', f'{where}:'), f'{where} name')
+        where = f'{file}: category {name}:'
+        mesh = files.inside(path, files.required(item, 'model', where), f'{where} model')
+        scale = files.number(item.get('scale', 1.0), f'{where} scale')
+        if scale <= 0:
+            raise HoocError(f'{where} scale is {scale:g}; give the metres of one model unit')
+        result.append(Category(name, mesh, scale))
+    check_categories(files.unique([category.name for category in result], f'{file}: categories'),
+                     file)
+    return tuple(result)
+
+
+def _scene_folders(path, needed):
+    """Return the sorted folders below scenes/."""
+    root = path / 'scenes'
+    folders = sorted(p for p in root.iterdir() if p.is_dir() and not p.name.startswith('.')) \
+        if root.is_dir() else []
+    if not folders and needed:
+        raise HoocError(f'{root}: there is no scene; add one folder a scene, '
+                        'with one <camera>.png each')
+    return folders
+
+
+def _chosen(names, cameras, cameras_file, dataset_file):
+    """Return the named cameras as a tuple."""
+    for name in names:
+        if name not in cameras:
+            raise HoocError(f'{cameras_file}: camera {name} is missing, which {dataset_file} '
+                            'lists under cameras; add its calibration or take it off the list')
+    return tuple(cameras[name] for name in names)
+
+
+def _scene_cameras(folder, names, set_cameras, path):
+    """Return a scene's cameras: its own where it has any, the set's otherwise."""
+    own = folder / 'cameras.yaml'
+    if not own.is_file():
+        if not set_cameras:
+            raise HoocError(f'{own}: the file is missing and {path / "cameras.yaml"} too; '
+                            'add one of them')
+        return _chosen(names, set_cameras, path / 'cameras.yaml', path / 'dataset.yaml')
+    return _chosen(names, {**set_cameras, **camera_files.load_cameras(own)}, own,
+                   path / 'dataset.yaml')
+
+
+def _scene(folder, camera_names, set_cameras, unit, categories, world, path):
+    """Return the Scene of one folder below scenes/."""
+    name = files.name(folder.name, f"{folder}: the name of a scene's folder")
+    depth_files = tuple(folder / f'{camera}.png' for camera in camera_names)
+    for camera, file in zip(camera_names, depth_files):
+        if not file.is_file():
+            raise HoocError(f'{file}: the depth image of camera {camera} is missing; '
+                            'record it or remove the scene')
+    labels = {camera: folder / f'{camera}_labels.png' for camera in camera_names
+              if (folder / f'{camera}_labels.png').is_file()}
+    truth_file = folder / 'ground_truth.yaml'
+    truth = _truth(truth_file, categories) if truth_file.is_file() else None
+    return Scene(name, _scene_cameras(folder, camera_names, set_cameras, path), depth_files,
+                 (unit,) * len(depth_files), truth, labels,
+                 table_known=world != UNKNOWN_WORLD)
+
+
+def _truth(file, categories):
+    """Return the tuple of TrueObject of a ground_truth.yaml."""
+    known = {category.name for category in categories}
+    objects = files.read_yaml(file)
+    objects = files.sequence(files.required(objects, 'objects', f'{file}:'), f'{file}: objects')
+    return tuple(true_object(item, f'{file}: objects[{i}]', known)
+                 for i, item in enumerate(objects))

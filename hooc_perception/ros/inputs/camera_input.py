@@ -1,0 +1,183 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""One raw depth camera: pairs images with calibration, knows where the camera stands."""
+
+from collections import OrderedDict
+import time
+
+from geometry_msgs.msg import TransformStamped
+from hooc_perception.errors import HoocError
+from hooc_perception.ros.health.silence import why_silent
+from hooc_perception.ros.inputs.camera_poses import PoseNotYet
+from hooc_perception.ros.messages.conversions import header, nanoseconds, transform_message
+from hooc_perception.ros.qos import auto_reliability, overridable, qos
+from sensor_msgs.msg import CameraInfo, Image
+
+
+class CameraInput:
+    """
+    Subscribe to one camera; call back with (image, info, transform) messages that agree.
+
+    :param node: a StageNode whose config has target_frame and image_reliability.
+    :param poses: mapping of the name to x y z qx qy qz qw (T_target_camera), or to () where
+        topics and tf say it; looked at for every image.
+    :param tf: TfPoses.
+    :param callback: called as callback(name, image, info, transform).
+    """
+
+    def __init__(self, node, name, poses, tf, callback):
+        """Create the subscriptions; the executor serves them in the order of creation."""
+        self.name, self.node, self._tf, self._callback = name, node, tf, callback
+        self._poses, self._latched = poses, None
+        self._infos, self._images, self._last_info = OrderedDict(), OrderedDict(), None
+        self._late = None               # (image, info) whose pose tf does not have yet
+        self._unplaced = None           # (image, info) that came before all word of a pose
+        # The stamp of the last image whose own camera_info did not come, 0 = all did.
+        self._unmatched = 0
+        self.heard = time.monotonic()   # when the last image came
+        node.subscription(TransformStamped, '<camera>/extrinsics', self._on_extrinsics,
+                          f'{name}/extrinsics')
+        self._reliable = None
+        self._subscriptions = []
+        node.owned(lambda _: self._unsubscribe(), None)
+        self.adapt_reliability()
+
+    def begin(self):
+        """Begin to listen: what was heard before does not count."""
+        self.heard, self._late, self._unplaced = time.monotonic(), None, None
+        self._images.clear()
+
+    # Reliability.
+
+    def adapt_reliability(self):
+        """Subscribe anew if what the publishers offer asks for another reliability."""
+        wanted = {'reliable': True, 'best_effort': False}.get(self.node.config.image_reliability)
+        if wanted is None:
+            topics = [f'{self.name}/depth/image_raw', f'{self.name}/depth/camera_info']
+            wanted = auto_reliability(
+                [info.qos_profile.reliability for topic in topics
+                 for info in self.node.get_publishers_info_by_topic(
+                     self.node.resolve_topic_name(topic))])
+        if wanted == self._reliable:
+            return
+        self._unsubscribe()
+        self._reliable = wanted
+        for kind, suffix, callback in ((CameraInfo, 'camera_info', self._on_info),
+                                       (Image, 'image_raw', self._on_image)):
+            self._subscriptions.append(self.node.create_subscription(
+                kind, f'{self.name}/depth/{suffix}', self.node.guarded(callback),
+                qos(f'<camera>/depth/{suffix}', wanted),
+                qos_overriding_options=overridable(reliability=False)))
+
+    def _unsubscribe(self):
+        while self._subscriptions:
+            self.node.destroy_subscription(self._subscriptions.pop())
+
+    # Messages.
+
+    def _on_extrinsics(self, message):
+        self._latched = message
+        if self._unplaced and self.node.active:
+            self._hand_on(*self._unplaced)
+
+    def _on_info(self, message):
+        self._last_info = message
+        self._hold(self._infos, message)
+        stamp = nanoseconds(message.header.stamp)
+        if stamp == self._unmatched:
+            self._unmatched = 0     # it was only late
+        self._match(stamp)
+
+    def _on_image(self, message):
+        self.heard = time.monotonic()
+        if not self.node.active:
+            return
+        stamp = nanoseconds(message.header.stamp)
+        self._hold(self._images, message)
+        if self._match(stamp):
+            return
+        if self._last_info is None:
+            if len(self._images) > 1:
+                self.node.diagnostics.warn(self.name, *self.info_silence())
+        elif self._unmatched or len(self._images) > 1:
+            # A driver that does not stamp both alike: after one image without its own
+            # camera_info, the latest one has to do.
+            self.node.diagnostics.count(self.name, 'camera_info_stamp_differs')
+            self._images.clear()
+            self._unmatched = stamp
+            self._deliver(message, self._last_info)
+
+    def _match(self, stamp):
+        """Deliver the pair of a stamp if both are there; return whether they were."""
+        if stamp not in self._images or stamp not in self._infos:
+            return False
+        image, info = self._images.pop(stamp), self._infos.pop(stamp)
+        self._unmatched = 0
+        self._images.clear()
+        self._deliver(image, info)
+        return True
+
+    def silence(self):
+        """Return (code, sentence) on why nothing comes of this camera, as far as one can see."""
+        topics = {s.topic_name.rpartition('/')[2]: s for s in self._subscriptions}
+        return why_silent(self.node, topics['image_raw'])
+
+    def info_silence(self):
+        """Return (code, sentence) on why no camera_info comes, None where one has come."""
+        if self._last_info is not None:
+            return None
+        topics = {s.topic_name.rpartition('/')[2]: s for s in self._subscriptions}
+        code, sentence = why_silent(self.node, topics['camera_info'])
+        return 'no_camera_info', f'depth images arrive but no camera_info: {sentence}'
+
+    @staticmethod
+    def _hold(waiting, message, capacity=4):
+        waiting[nanoseconds(message.header.stamp)] = message
+        while len(waiting) > capacity:
+            waiting.popitem(last=False)
+
+    def _deliver(self, image, info):
+        """Hand on an image, or with the next one where its pose comes later than itself."""
+        late, self._late = self._late, None
+        trouble = late and self._hand_on(*late)
+        if trouble:
+            self.node.diagnostics.warn(self.name, 'late_extrinsics',
+                                       f'{trouble}; the image is dropped')
+        if self._hand_on(image, info):
+            self._late = image, info
+
+    def _hand_on(self, image, info):
+        """Call back with an image; return the PoseNotYet where its pose is still to come."""
+        self._unplaced = None
+        try:
+            transform = self._extrinsics(image)
+        except PoseNotYet as error:
+            return error
+        except HoocError as error:
+            self.node.diagnostics.warn(self.name, 'no_extrinsics', str(error))
+            # Topics do not keep the order among each other: the latched pose may be under way.
+            self._unplaced = (image, info) if self._latched is None else None
+        else:
+            self._callback(self.name, image, info, transform)
+        return None
+
+    def _extrinsics(self, image):
+        """Return T_target_camera: from parameters, the latched topic or tf, in this order."""
+        target, frame = self.node.config.target_frame, image.header.frame_id
+        pose = self._poses[self.name]
+        if pose:
+            return transform_message(pose[:3], pose[3:], header(0, target), frame)
+        if self._latched is not None and self._latched.header.frame_id == target:
+            return self._latched
+        transform = self._tf.lookup(target, frame, image.header.stamp)
+        if transform is not None:
+            return transform
+        if self._latched is not None:
+            raise HoocError(
+                f'the extrinsics of {self.name} are given in frame '
+                f'{self._latched.header.frame_id!r}, but target_frame is {target!r}; set '
+                'target_frame to the former; the image is dropped')
+        raise HoocError(
+            f'nobody says where {self.name} stands: publish {self.name}/extrinsics or /tf_static '
+            f"({target} to {frame or 'the camera'}), or set parameter extrinsics.{self.name}; "
+            'of its images only the latest waits for that')

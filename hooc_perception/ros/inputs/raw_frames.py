@@ -1,0 +1,125 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""One raw camera's messages -> a frame that the stages can use, or the reason why not."""
+
+from dataclasses import dataclass
+import textwrap
+
+from geometry_msgs.msg import TransformStamped
+from hooc_perception.core.segment.checks import (
+    pose_trouble,
+    reading_trouble,
+    same_calibration,
+)
+from hooc_perception.core.segment.fusion import Fusion
+from hooc_perception.core.types import Camera, DepthView
+from hooc_perception.errors import HoocError
+from hooc_perception.io.depth_encodings import unit_trouble
+from hooc_perception.ros.messages.conversions import camera_from_messages, depth_from_message
+import numpy as np
+
+
+class FrameRefused(HoocError):
+    """A frame that cannot be used; `code` is the reason in short."""
+
+    def __init__(self, code, sentence):
+        super().__init__(sentence)
+        self.code = code
+
+
+@dataclass(frozen=True)
+class RawFrame:
+    """
+    A decoded frame.
+
+    :ivar camera: Camera.
+    :ivar depth: (H, W) float32 metres, raw, NaN = none.
+    :ivar frame_id: of the optical frame.
+    """
+
+    camera: Camera
+    depth: np.ndarray
+    frame_id: str
+
+
+class RawFrames:
+    """
+    Decode the frames of one camera, refuse what cannot be meant, remember the last few.
+
+    :ivar camera: the Camera of the last good frame, None before.
+    """
+
+    def __init__(self, name):
+        self.name, self.camera = name, None
+        self._key = self._known = None
+        self._fusion = Fusion()
+
+    def decode(self, image, info, transform, max_depth_m):
+        """
+        Return the RawFrame of three messages.
+
+        :raises FrameRefused: with the code `bad_calibration`, `bad_extrinsics`,
+            `absurd_extrinsics`, `bad_image`, `size_mismatch`, `wrong_unit` or `no_readings`.
+        """
+        camera = self._camera(info, transform)
+        depth = _refusing('bad_image', depth_from_message, image)
+        if depth.shape != (camera.height, camera.width):
+            raise FrameRefused(
+                'size_mismatch', f'the depth image of camera {self.name} is {image.width} x '
+                f'{image.height} pixels, but its camera_info is for {camera.width} x '
+                f'{camera.height}; publish both at the same resolution')
+        _refuse('wrong_unit', unit_trouble(depth, image.encoding, max_depth_m))
+        _refuse('no_readings', reading_trouble(depth))
+        if self.camera is not None and not same_calibration(camera, self.camera):
+            self._fusion.forget()
+        self.camera = camera
+        return RawFrame(camera, depth, image.header.frame_id)
+
+    def remember(self, depth, frames):
+        """
+        Keep an image for fusion.
+
+        :param frames: how many to keep; 1 keeps nothing of the past.
+        """
+        if frames > 1:
+            self._fusion.add(depth, frames)
+        else:
+            self.forget()
+
+    def forget(self):
+        """Forget what was kept for fusion."""
+        self._fusion.forget()
+
+    def view(self, frame):
+        """Return the DepthView of a RawFrame, fused with what is remembered, and the counts."""
+        if len(self._fusion) < 2:
+            return DepthView(frame.camera, frame.depth), None
+        depth, count = self._fusion.fused()
+        return DepthView(frame.camera, depth), count
+
+    def _camera(self, info, transform):
+        """Return the Camera of two messages; the same object while they say the same."""
+        key = (info.width, info.height, info.k.tobytes(), tuple(info.d), info.distortion_model,
+               str(transform.transform))
+        if key == self._key:
+            return self._known
+        unmoved = TransformStamped()
+        _refusing('bad_calibration', camera_from_messages, self.name, info, unmoved)
+        camera = _refusing('bad_extrinsics', camera_from_messages, self.name, info, transform)
+        _refuse('absurd_extrinsics', pose_trouble(camera), f'camera {self.name}: ')
+        self._key, self._known = key, camera
+        return camera
+
+
+def _refusing(code, function, *args):
+    """Return function(*args); a HoocError becomes a FrameRefused, of bearable length."""
+    try:
+        return function(*args)
+    except HoocError as error:
+        raise FrameRefused(code, textwrap.shorten(str(error), 500, placeholder=' ...')) from error
+
+
+def _refuse(code, trouble, before=''):
+    """Raise FrameRefused where there is trouble."""
+    if trouble:
+        raise FrameRefused(code, before + trouble)

@@ -1,0 +1,175 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Camera messages <-> core types, exactly there and back.
+
+Poses travel as (translation, quaternion) in float64. Cameras are built from them by
+`core.geometry.canonical_pose`, as core.segment.observe.rectify does it, so that every process
+has the same matrix as the one-process chain.
+"""
+
+from array import array
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import Pose, PoseArray, TransformStamped
+from hooc_perception.core.geometry import canonical_pose, matrix_from_pose
+from hooc_perception.core.segment.checks import skew_trouble
+from hooc_perception.core.types import Camera
+from hooc_perception.errors import HoocError
+from hooc_perception.io.depth_encodings import decode_depth, decode_image, METRES
+import numpy as np
+from sensor_msgs.msg import CameraInfo, Image
+from std_msgs.msg import Header
+
+# Number of coefficients that the undistortion knows; the rest of a longer list must be zero.
+_COEFFICIENTS = {'plumb_bob': 5, 'rational_polynomial': 8}
+
+
+def nanoseconds(stamp):
+    """Return the int nanoseconds of a builtin_interfaces/Time."""
+    return stamp.sec * 1_000_000_000 + stamp.nanosec
+
+
+def time_message(stamp_ns):
+    """Return the builtin_interfaces/Time of int nanoseconds."""
+    return Time(sec=int(stamp_ns // 1_000_000_000), nanosec=int(stamp_ns % 1_000_000_000))
+
+
+def header(stamp_ns, frame_id):
+    """Return a Header of int nanoseconds and a frame."""
+    return Header(stamp=time_message(stamp_ns), frame_id=frame_id)
+
+
+def message_bytes(pixels):
+    """
+    Return the array('B') that a message's `data` wants, of any contiguous ndarray.
+
+    Filling from a memoryview is several times faster than from bytes, and rclpy takes an
+    array without looking at every element.
+    """
+    data = array('B')
+    pixels = np.ascontiguousarray(pixels)
+    if pixels.size:
+        data.frombytes(memoryview(pixels.reshape(-1).view(np.uint8)))
+    return data
+
+
+def image_message(pixels, encoding, head):
+    """Return an Image of a 2-D little-endian array; step is its packed row."""
+    return Image(header=head, height=pixels.shape[0], width=pixels.shape[1], encoding=encoding,
+                 is_bigendian=0, step=pixels.shape[1] * pixels.itemsize,
+                 data=message_bytes(pixels))
+
+
+def depth_message(depth, head):
+    """Return the 32FC1 Image of (H, W) float32 metres, NaN = none."""
+    return image_message(np.asarray(depth, np.dtype('<f4')), METRES, head)
+
+
+def depth_from_message(message):
+    """
+    Return (H, W) float32 metres, NaN = none, of a depth Image.
+
+    :raises HoocError: for an encoding or a layout that is no depth image.
+    """
+    return decode_depth(message.data, message.height, message.width, message.encoding,
+                        message.step, bool(message.is_bigendian))
+
+
+def labels_message(labels, head):
+    """Return the mono8 Image of (H, W) uint8 class ids."""
+    return image_message(np.asarray(labels, np.uint8), 'mono8', head)
+
+
+def labels_from_message(message):
+    """Return (H, W) uint8 class ids of a mono8 Image."""
+    if message.encoding not in ('mono8', '8UC1'):
+        raise HoocError(f'encoding {message.encoding!r} is not a label image; publish mono8')
+    return decode_image(message.data, message.height, message.width, np.uint8, message.step)
+
+
+def camera_info_message(camera, head):
+    """Return the CameraInfo of a Camera (monocular: R = identity, P = [K 0])."""
+    P = np.hstack([camera.K, np.zeros((3, 1))])
+    return CameraInfo(header=head, height=camera.height, width=camera.width,
+                      distortion_model=camera.distortion_model,
+                      d=np.asarray(camera.D, np.float64).tolist(),
+                      k=np.asarray(camera.K, np.float64).reshape(-1), r=np.eye(3).reshape(-1),
+                      p=P.reshape(-1))
+
+
+def transform_message(translation, rotation_xyzw, head, child_frame_id):
+    """Return T_parent_child as a TransformStamped; `head.frame_id` is the parent."""
+    message = TransformStamped(header=head, child_frame_id=child_frame_id)
+    t, q = message.transform.translation, message.transform.rotation
+    t.x, t.y, t.z = (float(x) for x in translation)
+    q.x, q.y, q.z, q.w = (float(x) for x in rotation_xyzw)
+    return message
+
+
+def pose_of_transform(message):
+    """Return (translation (3,), rotation_xyzw (4,)) float64 of a TransformStamped, untouched."""
+    t, q = message.transform.translation, message.transform.rotation
+    return np.array([t.x, t.y, t.z]), np.array([q.x, q.y, q.z, q.w])
+
+
+def camera_from_messages(name, info, transform):
+    """
+    Return the Camera that a CameraInfo and its extrinsics describe.
+
+    :param transform: TransformStamped T_world_camera, camera optical frame to world.
+    :raises HoocError: where a calibration cannot be used, naming camera and field.
+    """
+    K, D = np.array(info.k, np.float64).reshape(3, 3), np.array(info.d, np.float64)
+    if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0 and K[2, 2] == 1):
+        raise HoocError(f'camera_info of {name} holds no calibration (K = {info.k.tolist()}); '
+                        'calibrate the camera or point its driver to the calibration file')
+    if trouble := skew_trouble(K):
+        raise HoocError(f'camera_info of {name} has {trouble}')
+    if info.width == 0 or info.height == 0:
+        raise HoocError(f'camera_info of {name} says {info.width} x {info.height} pixels; the '
+                        'driver has to fill width and height')
+    model = info.distortion_model or 'plumb_bob'
+    if model not in _COEFFICIENTS:
+        raise HoocError(f'camera_info of {name} uses distortion model {model!r}; calibrate with '
+                        'plumb_bob or rational_polynomial')
+    if not np.isfinite(D).all() or np.any(D[_COEFFICIENTS[model]:] != 0):
+        raise HoocError(f'camera_info of {name} has distortion coefficients D = {D.tolist()}; '
+                        f'{model} takes {_COEFFICIENTS[model]} finite numbers')
+    translation, rotation = pose_of_transform(transform)
+    if not is_rigid(translation, rotation):
+        raise HoocError(f'the extrinsics of {name} are not a rigid transform (translation '
+                        f'{translation.tolist()}, rotation {rotation.tolist()}); the quaternion '
+                        'must have norm 1')
+    if len(D) == 0:
+        D = np.zeros(_COEFFICIENTS[model])
+    return Camera(name, info.width, info.height, K, D,
+                  canonical_pose(matrix_from_pose(translation, rotation)), model)
+
+
+def is_rigid(translation, rotation_xyzw):
+    """Return whether (3,) and (4,) numbers are finite and a quaternion of norm 1."""
+    return bool(np.isfinite(translation).all() and abs(np.linalg.norm(rotation_xyzw) - 1) < 1e-2)
+
+
+def pose_message(translation, rotation_xyzw):
+    """Return the Pose of (3,) and (4,) float64, kept to the last bit."""
+    pose = Pose()
+    p, q = pose.position, pose.orientation
+    p.x, p.y, p.z = np.asarray(translation).tolist()
+    q.x, q.y, q.z, q.w = np.asarray(rotation_xyzw).tolist()
+    return pose
+
+
+def pose_array_message(translation, rotation_xyzw, head):
+    """Return the PoseArray of (n, 3) and (n, 4) float64, kept to the last bit."""
+    return PoseArray(header=head, poses=[
+        pose_message(t, q) for t, q in zip(translation, rotation_xyzw)])
+
+
+def poses_from_message(message):
+    """Return ((n, 3) translations, (n, 4) xyzw quaternions) float64 of a PoseArray."""
+    rows = np.array([(p.position.x, p.position.y, p.position.z, p.orientation.x,
+                      p.orientation.y, p.orientation.z, p.orientation.w) for p in message.poses])
+    rows = rows.reshape(-1, 7)
+    return rows[:, :3].copy(), rows[:, 3:].copy()

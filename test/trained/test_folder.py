@@ -1,0 +1,208 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The MODEL folder: what is saved comes back, and what was tampered with does not."""
+
+from dataclasses import replace
+import json
+import shutil
+
+from hooc_perception.core.types import Camera
+from hooc_perception.errors import HoocError
+from hooc_perception.objects.derive import derive
+from hooc_perception.trained.folder import load_model_folder, save_model_folder
+import numpy as np
+import pytest
+import trimesh
+
+CAMERA = Camera('kinect1', 512, 424, np.array([[365.0, 0, 257], [0, 365, 208], [0, 0, 1]]),
+                np.array([0.09, -0.27, 0, 0, 0.09]), np.eye(4))
+CLASSIFIER = {'features': np.arange(12, dtype=np.float32).reshape(3, 4),
+              'leaves': np.arange(20, dtype=np.uint8), 'empty': np.zeros((0, 3), np.int32),
+              'scale': np.float64(0.5)}
+
+
+@pytest.fixture(scope='module')
+def models():
+    shapes = {'box': trimesh.creation.box((0.1, 0.2, 0.3)),
+              'ball': trimesh.creation.icosphere(2, 0.05),
+              'can': trimesh.creation.cylinder(0.03, 0.12)}
+    return tuple(derive(name, mesh, np.random.default_rng(0)) for name, mesh in shapes.items())
+
+
+@pytest.fixture(scope='module')
+def saved(models, tmp_path_factory):
+    path = tmp_path_factory.mktemp('models') / 'kitchen'
+    save_model_folder(path, 'kitchen', models, CLASSIFIER, 'fast', 7, (CAMERA,), 1)
+    return path
+
+
+@pytest.fixture
+def folder(saved, tmp_path):
+    """Return a copy that a test may spoil."""
+    return shutil.copytree(saved, tmp_path / 'kitchen')
+
+
+def _edit(folder, change):
+    """Apply a function to the dict in model.json."""
+    meta = json.loads((folder / 'model.json').read_text())
+    change(meta)
+    (folder / 'model.json').write_text(json.dumps(meta))
+
+
+def _refused(folder, words):
+    with pytest.raises(HoocError, match=words) as caught:
+        load_model_folder(folder)
+    assert '\n' not in str(caught.value)
+
+
+def test_there_and_back(saved, models):
+    back = load_model_folder(saved)
+    assert (back.name, back.profile, back.seed, back.max_instances) == ('kitchen', 'fast', 7, 1)
+    assert [m.name for m in back.models] == ['box', 'ball', 'can']
+    for a, b in zip(models, back.models):
+        for key in vars(a):
+            np.testing.assert_array_equal(getattr(a, key), getattr(b, key))
+            assert np.asarray(getattr(a, key)).dtype == np.asarray(getattr(b, key)).dtype
+    assert list(back.classifier) == list(CLASSIFIER)
+    for key, array in CLASSIFIER.items():
+        assert type(back.classifier[key]) is np.ndarray
+        assert back.classifier[key].dtype == array.dtype
+        np.testing.assert_array_equal(back.classifier[key], array)
+    camera = back.cameras[0]
+    assert (camera.name, camera.width, camera.height) == ('kinect1', 512, 424)
+    for key in ('K', 'D', 'T_world_camera'):
+        np.testing.assert_array_equal(getattr(camera, key), getattr(CAMERA, key))
+
+
+def test_meshes_are_there_for_viewers(saved, models):
+    back = load_model_folder(saved)
+    for model in models:
+        mesh = trimesh.load(back.mesh_path(model.name), process=False)
+        np.testing.assert_allclose(mesh.extents, model.extents, rtol=1e-5)
+        assert len(back.mesh_sha256[model.name]) == 64
+
+
+def test_writing_to_a_loaded_array_leaves_the_file_alone(folder):
+    load_model_folder(folder).classifier['leaves'][:] = 99
+    np.testing.assert_array_equal(load_model_folder(folder).classifier['leaves'], np.arange(20))
+
+
+def test_replaced_as_a_whole_or_not_at_all(folder, models):
+    with pytest.raises(HoocError, match='leaves'):
+        save_model_folder(folder, 'x', models[:1], {'leaves': np.array([object()])}, 'fast', 0, ())
+    assert load_model_folder(folder).name == 'kitchen'
+    save_model_folder(folder, 'second', models[:1], {}, 'best', 0, ())
+    back = load_model_folder(folder)
+    assert back.name == 'second' and len(back.models) == 1 and not back.classifier
+    assert [p.name for p in folder.parent.iterdir()] == ['kitchen']
+
+
+def test_other_folders_are_not_overwritten(tmp_path, models):
+    (tmp_path / 'notes.txt').write_text('mine')
+    with pytest.raises(HoocError, match='not a model folder'):
+        save_model_folder(tmp_path, 'x', models, {}, 'fast', 0, ())
+    assert (tmp_path / 'notes.txt').read_text() == 'mine'
+
+
+@pytest.mark.parametrize('name', ['../evil', 'a/b', '', '.hidden', 'a b', 'x' * 200])
+def test_names_must_be_fit_for_files(tmp_path, models, name):
+    with pytest.raises(HoocError, match='name'):
+        save_model_folder(tmp_path / 'm', 'x', models, {name: np.zeros(3)}, 'fast', 0, ())
+    assert not (tmp_path / 'm').exists()
+
+
+def test_names_must_differ_as_topics(folder, models, tmp_path):
+    taken = [replace(models[0], name='can-1'), replace(models[2], name='can.1')]
+    with pytest.raises(HoocError, match="'can-1' and 'can.1' would share"):
+        save_model_folder(tmp_path / 'm', 'x', taken, CLASSIFIER, 'fast', 0, ())
+    assert not (tmp_path / 'm').exists()
+    _edit(folder, lambda meta: meta.update(categories=['can-1', 'ball', 'can_1']))
+    _refused(folder, "'can-1' and 'can_1' would share")
+
+
+def test_not_a_model_folder(tmp_path):
+    _refused(tmp_path, 'not a model folder')
+    _refused(tmp_path / 'nowhere', 'not a model folder')
+
+
+@pytest.mark.parametrize('text, words', [
+    ('{', 'not valid JSON'), ('[1]', 'format None'), ('{"format": "hooc-model/2"}', 'model/2'),
+    ('{"format": "hooc-model/1"}', 'lacks'), ('[' * 100000, 'not valid JSON'),
+    ('{"format": "hooc-model/1", "files": 3}', 'lacks')])
+def test_garbled_meta_data(folder, text, words):
+    (folder / 'model.json').write_text(text)
+    _refused(folder, words)
+
+
+@pytest.mark.parametrize('file', ['models.npz', 'meshes/ball.ply', 'classifier/leaves.npy'])
+def test_missing_and_damaged_files(folder, file):
+    data = bytearray((folder / file).read_bytes())
+    (folder / file).write_bytes(data[:-1])
+    _refused(folder, 'damaged')
+    data[len(data) // 2] ^= 1
+    (folder / file).write_bytes(data)
+    _refused(folder, 'checksum')
+    (folder / file).unlink()
+    _refused(folder, f'{file} is missing')
+
+
+def test_paths_out_of_the_folder(folder, tmp_path):
+    for field in ('categories', 'classifier'):
+        spoiled = shutil.copytree(folder, tmp_path / field)
+        _edit(spoiled, lambda meta, field=field: meta[field].append('../../secret'))
+        _refused(spoiled, 'secret')
+    outside = tmp_path / 'leaves.npy'
+    shutil.move(folder / 'classifier' / 'leaves.npy', outside)
+    (folder / 'classifier' / 'leaves.npy').symlink_to(outside)
+    _refused(folder, 'points outside')
+
+
+def _replace(folder, file, write):
+    """Write a file anew and enter its true size and checksum into model.json."""
+    import hashlib
+    write(folder / file)
+    data = (folder / file).read_bytes()
+    _edit(folder, lambda meta: meta['files'].update(
+        {file: {'bytes': len(data), 'sha256': hashlib.sha256(data).hexdigest()}}))
+
+
+def test_pickles_are_refused(folder, tmp_path):
+    class Evil:
+        def __reduce__(self):
+            return (open, (str(tmp_path / 'was_run'), 'w'))
+
+    _replace(folder, 'classifier/leaves.npy', lambda path: np.save(
+        path, np.array([Evil()], object), allow_pickle=True))
+    _refused(folder, 'leaves.npy is not an array of plain numbers')
+    _replace(folder, 'classifier/leaves.npy', lambda path: np.save(path, np.arange(20)))
+    load_model_folder(folder)
+    _replace(folder, 'models.npz', lambda path: np.savez(
+        path, extents=np.array([Evil()], object)))
+    _refused(folder, 'models.npz is not what hooc train writes')
+    assert not (tmp_path / 'was_run').exists()
+
+
+@pytest.mark.parametrize('key, spoil', [
+    ('faces', lambda a: a + 10**6), ('faces', lambda a: a - 1), ('vertices', lambda a: a[:-1]),
+    ('vertices', lambda a: a * np.nan), ('extents', lambda a: a * 0),
+    ('surface_points', lambda a: a[:1]), ('surface_points', lambda a: a[..., :2]),
+    ('interior_points', lambda a: a.astype(complex)), ('symmetry', lambda a: a.astype(float)),
+    ('vertices_count', lambda a: -a), ('volume', None)])
+def test_arrays_that_would_lead_compiled_code_astray(folder, key, spoil):
+    def write(path):
+        arrays = dict(np.load(path))
+        if spoil is None:
+            del arrays[key]
+        else:
+            arrays[key] = spoil(arrays[key])
+        np.savez(path, **arrays)
+    _replace(folder, 'models.npz', write)
+    _refused(folder, 'models.npz is not what hooc train writes')
+
+
+@pytest.mark.parametrize('content', [b'', b'PK junk', b'\x93NUMPY\x01\x00\x10\x00{"descr": 1}'])
+def test_arrays_that_are_none(folder, content):
+    _replace(folder, 'classifier/leaves.npy', lambda path: path.write_bytes(content))
+    _refused(folder, 'leaves.npy')
+    _replace(folder, 'models.npz', lambda path: path.write_bytes(content))
+    _refused(folder, 'models.npz')

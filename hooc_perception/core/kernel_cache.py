@@ -68,7 +68,8 @@ def drop_stale(environment=os.environ, package=PACKAGE):
     now = hashlib.sha256()
     for source in sorted(package.glob('core/**/kernels/*.py')):
         state = source.stat()
-        now.update(f'{source} {state.st_mtime_ns} {state.st_size}\n'.encode())
+        name = source.relative_to(package).as_posix()
+        now.update(f'{name} {state.st_mtime_ns} {state.st_size}\n'.encode())
     root, folders = _place(environment, package)
     # In the package's own cache folder, which git and builds leave out.
     stamp = root / '__pycache__' / f'{package.name}.sources'

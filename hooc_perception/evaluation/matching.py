@@ -50,7 +50,7 @@ def posed(thing):
 
 def in_frame_of(scene, entry):
     """
-    Return a results entry (dict) with its objects in the table frame of a Scene.
+    Return a results entry (dict) with its objects in the table frame of a RecordedScene.
 
     Where the world is not known to be a table's, the frame is estimated, and the results say
     which one they used; another version may estimate another, so both are compared in the

@@ -106,7 +106,7 @@ def worst_scenes(scene_set, evaluation, models, n, pools=None):
 
 
 def _looked_at(scene, score, estimates, models, pool):
-    """Return the WorstScene of a Scene and its SceneScore."""
+    """Return the WorstScene of a RecordedScene and its SceneScore."""
     truths = tuple(posed(t) for t in scene.truth)
     views = [rectify(view, RECTIFY) for view in scene.depth()]
     shown, alone, taken = _pixels(truths, estimates, models, views)

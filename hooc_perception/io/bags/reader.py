@@ -35,7 +35,7 @@ TF = 'tf2_msgs/msg/TFMessage'
 
 class BagScene:
     """
-    One frame set of a bag, with the interface of scenes.Scene.
+    One frame set of a bag, with the interface of RecordedScene.
 
     :ivar path: the bag.
     :ivar topics: {name: BagTopic}.

@@ -55,7 +55,7 @@ def write_bag(scene, scene_set, out_dir, storage='mcap', repeat=1, rate=10.0):
     Depth in millimetres goes out as 16UC1, in another unit as 32FC1, so that nothing is
     rounded and a bag parses to the same objects as its scene set.
 
-    :param scene: Scene, or anything with its name, cameras, depth(), labels() and truth.
+    :param scene: RecordedScene, or anything with its name, cameras, depth(), labels() and truth.
     :param scene_set: SceneSet that the scene is of: name, categories, limits, world frame.
     :param storage: 'mcap' or 'sqlite3'.
     :param repeat: number of frame sets; the same images each time, with new stamps.

@@ -16,7 +16,7 @@ from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import camera_files, files, png
 from hooc_perception.io.scenes.nominal_table import nominal_cameras
-from hooc_perception.io.scenes.scene import Category, Scene, TrueObject
+from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
 from hooc_perception.objects.mesh import mesh_box
 import numpy as np
 
@@ -117,7 +117,7 @@ def _scenes(folder, categories, boxes):
         cameras, depth_files, units = zip(*(_shot(folder, *shot) for shot in shots))
         truth = _truth(truths, [key for key, _, _ in shots], cameras, truth_file, categories,
                        boxes)
-        scenes.append(Scene(name, cameras, depth_files, units, truth, table_known=False))
+        scenes.append(RecordedScene(name, cameras, depth_files, units, truth, table_known=False))
     return scenes
 
 

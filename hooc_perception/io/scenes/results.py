@@ -20,7 +20,7 @@ def scene_result(name, parsed, category_names, seconds, **extra):
     :param parsed: ParsedScene.
     :param category_names: names of the class ids 1..N.
     :param seconds: from the last depth image's arrival to the answer.
-    :param extra: more entries of this scene, such as `world` of a Scene or a seed.
+    :param extra: more entries of this scene, such as `world` of a RecordedScene or a seed.
     """
     energy = {term: _finite(getattr(parsed.energy, term)) for term in _TERMS}
     found = parsed.objects

@@ -46,7 +46,7 @@ class TrueObject:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class RecordedScene:
     """
     One recorded frame set.
 

@@ -11,7 +11,7 @@ from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import camera_files, files
 from hooc_perception.io.scenes.bop import is_bop, load_bop
 from hooc_perception.io.scenes.nominal_table import nominal_cameras
-from hooc_perception.io.scenes.scene import Category, Scene, TrueObject
+from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
 from hooc_perception.io.scenes.truth import true_object
 from hooc_perception.io.scenes.writer import FORMAT, NewScene, write_scene_set
 
@@ -20,7 +20,7 @@ MAX_CATEGORIES = 255
 # The world_frame of sets whose poses are not in a table's frame.
 UNKNOWN_WORLD = 'unknown'
 
-__all__ = ['Category', 'NewScene', 'Scene', 'SceneSet', 'TrueObject', 'load_scene_set',
+__all__ = ['Category', 'NewScene', 'RecordedScene', 'SceneSet', 'TrueObject', 'load_scene_set',
            'write_scene_set']
 
 
@@ -33,7 +33,7 @@ class SceneSet:
     :ivar categories: tuple of Category; class id c is categories[c - 1].
     :ivar cameras: tuple of Camera: the set's, or those of its first scene.
     :ivar max_instances: objects of one category that a scene may hold, 0 = no limit.
-    :ivar scenes: tuple of Scene, sorted by name; their depth is read when asked for.
+    :ivar scenes: tuple of RecordedScene, sorted by name; their depth is read when asked for.
     """
 
     path: Path
@@ -180,7 +180,7 @@ def _scene_cameras(folder, names, set_cameras, path):
 
 
 def _scene(folder, camera_names, set_cameras, unit, categories, world, path):
-    """Return the Scene of one folder below scenes/."""
+    """Return the RecordedScene of one folder below scenes/."""
     name = files.name(folder.name, f"{folder}: the name of a scene's folder")
     depth_files = tuple(folder / f'{camera}.png' for camera in camera_names)
     for camera, file in zip(camera_names, depth_files):
@@ -191,9 +191,9 @@ def _scene(folder, camera_names, set_cameras, unit, categories, world, path):
               if (folder / f'{camera}_labels.png').is_file()}
     truth_file = folder / 'ground_truth.yaml'
     truth = _truth(truth_file, categories) if truth_file.is_file() else None
-    return Scene(name, _scene_cameras(folder, camera_names, set_cameras, path), depth_files,
-                 (unit,) * len(depth_files), truth, labels,
-                 table_known=world != UNKNOWN_WORLD)
+    cameras = _scene_cameras(folder, camera_names, set_cameras, path)
+    return RecordedScene(name, cameras, depth_files, (unit,) * len(depth_files), truth, labels,
+                         table_known=world != UNKNOWN_WORLD)
 
 
 def _truth(file, categories):

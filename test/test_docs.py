@@ -51,9 +51,9 @@ def test_commands_have_the_options_that_the_page_shows(page):
         assert {word.split('=')[0] for word in words if word.startswith('--')} <= known, command
 
 
-def test_the_readme_lists_every_command():
-    readme = (ROOT / 'README.md').read_text()
-    assert not [name for name in cli.COMMANDS if f'| `hooc {name}` |' not in readme]
+def test_the_page_of_commands_lists_every_command():
+    page = (ROOT / 'docs' / 'commands.md').read_text()
+    assert not [name for name in cli.COMMANDS if f'| `hooc {name}` |' not in page]
 
 
 def test_every_pinned_direct_dependency_is_explained():

@@ -6,7 +6,9 @@ from hooc_perception.benchmark.fuzz_bags import small_scene
 from hooc_perception.benchmark.mutate import damaged, odd_number, odd_text
 from hooc_perception.core.geometry import pose_from_matrix
 from hooc_perception.core.segment.checks import table_trouble
-from hooc_perception.core.segment.observe import observe, ObserveConfig, rectify
+from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Candidates, PixelProbabilities
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.inputs.raw_frames import RawFrames

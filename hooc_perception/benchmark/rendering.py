@@ -9,7 +9,7 @@ from hooc_perception.benchmark.measure import Contest, Contestant
 from hooc_perception.benchmark.scene import candidate_meshes
 from hooc_perception.core.geometry import rays
 from hooc_perception.core.render import projected, render_depth, render_patch
-from hooc_perception.core.segment.observe import rectify
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import DepthView
 import numpy as np
 import open3d as o3d

@@ -10,7 +10,8 @@ from hooc_perception.core.hypotheses.propose import propose, propose_more
 from hooc_perception.core.parsing.calibration import finished, with_sigmas
 from hooc_perception.core.parsing.parse import parse
 from hooc_perception.core.parsing.verifier import Verifier
-from hooc_perception.core.segment.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 
 
 class Pipeline:

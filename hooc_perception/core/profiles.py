@@ -12,7 +12,7 @@ from dataclasses import dataclass, fields, replace
 from hooc_perception.core.classification.classify import ClassifyConfig
 from hooc_perception.core.hypotheses.propose import ProposeConfig
 from hooc_perception.core.parsing.parse import ParseConfig
-from hooc_perception.core.segment.observe import ObserveConfig
+from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.errors import HoocError
 
 NAMES = ('paper', 'best', 'fast')

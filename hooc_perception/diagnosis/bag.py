@@ -7,7 +7,9 @@ from dataclasses import dataclass, field
 
 from hooc_perception.core.classification.classify import KIND_PAPER
 from hooc_perception.core.segment.checks import rig_trouble
-from hooc_perception.core.segment.observe import observe, ObserveConfig, rectify
+from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.camera_topics import camera_from_info, depth_topics

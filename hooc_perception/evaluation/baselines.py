@@ -14,7 +14,8 @@ import time
 
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import back_project, pose_from_matrix, stage_rng
-from hooc_perception.core.segment.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.visibility import surface_samples
 from hooc_perception.io.scenes.results import write_results

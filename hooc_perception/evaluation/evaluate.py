@@ -5,7 +5,8 @@
 from dataclasses import dataclass, field
 
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.segment.observe import ObserveConfig, rectified_numbers, rectify
+from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.rectify import rectified_numbers, rectify
 from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.bop import bop_score

@@ -8,7 +8,8 @@ from hooc_perception.core.classification.classify import classify
 from hooc_perception.core.energy.eq1 import energy_of
 from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile as named_profile
-from hooc_perception.core.segment.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.evaluation.matching import posed
 from hooc_perception.evaluation.scores import score_scene
 from hooc_perception.evaluation.stages import as_candidates, as_objects, pixel_scores, pool_recall

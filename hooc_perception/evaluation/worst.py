@@ -5,7 +5,7 @@
 from dataclasses import asdict, dataclass, field
 
 from hooc_perception.core.render import render_depth, render_patch
-from hooc_perception.core.segment.observe import rectify
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.as_json import plain

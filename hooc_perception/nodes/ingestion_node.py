@@ -9,7 +9,7 @@ import time
 from geometry_msgs.msg import PoseArray
 from hooc_perception.core.config import param
 from hooc_perception.core.segment.checks import table_trouble
-from hooc_perception.core.segment.observe import rectified_numbers, rectify
+from hooc_perception.core.segment.rectify import rectified_numbers, rectify
 from hooc_perception.core.types import DepthView, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.frame_sets import EXPLAINED, FrameSetConfig, FrameSets, SILENT

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 from hooc_perception.core.geometry import posed_vertices, stage_rng
 from hooc_perception.core.hypotheses.propose import propose, ProposeConfig
 from hooc_perception.core.render import render_depth
-from hooc_perception.core.segment.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import (
     Camera,
     Candidates,

@@ -11,7 +11,8 @@ from hooc_perception.core.parsing.calibration import finished
 from hooc_perception.core.parsing.parse import parse, ParseConfig
 from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile
-from hooc_perception.core.segment.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Candidates
 from hooc_perception.errors import HoocError
 import numpy as np

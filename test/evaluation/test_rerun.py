@@ -4,7 +4,7 @@
 
 from types import SimpleNamespace
 
-from hooc_perception.core.segment.observe import ObserveConfig
+from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.types import Energy, PixelProbabilities
 from hooc_perception.evaluation import rerun as rerun_module
 from hooc_perception.evaluation.paper_tables import energy_table

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Classifier and pool scores on made-up probabilities and pools."""
 
-from hooc_perception.core.segment.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Candidates, PixelProbabilities
 from hooc_perception.evaluation.scores import score_scene
 from hooc_perception.evaluation.stages import (

@@ -8,7 +8,8 @@ from hooc_perception.core.classification.classify import classify
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.parsing.parse import parse
 from hooc_perception.core.profiles import profile
-from hooc_perception.core.segment.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Candidates, PixelProbabilities
 from hooc_perception.evaluation.matching import posed
 from hooc_perception.evaluation.scores import score_scene

@@ -10,7 +10,8 @@ to the last bit; and what the last stage answers comes out as promised.
 from dataclasses import replace
 import json
 
-from hooc_perception.core.segment.observe import observe, rectify
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import DepthView
 import numpy as np
 import pytest

@@ -5,7 +5,7 @@
 import importlib.util
 from pathlib import Path
 
-from hooc_perception.core.segment.observe import rectify
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import DepthView
 import numpy as np
 import pytest

@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
-from hooc_perception.core.segment.observe import rectify
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 import numpy as np

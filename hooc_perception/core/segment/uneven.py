@@ -1,41 +1,43 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-How far from flat a sensor sees a flat table.
+Depth distortion: how far from flat a sensor measures a flat table.
 
 Time-of-flight and structured-light cameras bend a plane by a few millimetres, smoothly over
 the image and differently in every unit (lens, multiple paths, cyclic errors): as much as a
-fork is high. Against the table as it is seen nearby, the fork stands out again.
+fork is high. Relative to the table as it is measured nearby, the fork stands out again.
 """
 
+from hooc_perception.core.arrays import BoolArray, Float64Array
 import numpy as np
 from scipy.ndimage import uniform_filter
 
 LEAST_SHARE = 0.1
 
 
-def uneven_table(height, table, window, rounds=3):
+def uneven_table(height: Float64Array, table: BoolArray, window: float,
+                 rounds: int = 3) -> tuple[Float64Array, float]:
     """
-    Return the table's seen height around every pixel, and the noise that is left.
+    Return the measured height of the table around every pixel, and the noise that is left.
 
-    :param height: (H, W) metres over the plane, NaN = none.
+    :param height: (H, W) metres above the plane, NaN = none.
     :param table: (H, W) bool, pixels that may be table; low objects among them are trimmed.
     :param window: pixels, the width of the neighbourhood of a pixel.
     :return: (H, W) float64 metres, 0 (the plane) where little table is near; standard
-        deviation of the heights from it, metres.
+        deviation of the heights from it in metres, infinite if there is no table.
     """
-    # What bends over a dozen pixels shows in every second one as well.
+    # A distortion that is smooth over a dozen pixels is captured by every second one as well.
     step = 2 if window > 12 else 1
     h = height[::step, ::step].astype(np.float32)
     table = table[::step, ::step]
-    window = int(window / step) | 1
+    width = int(window / step) | 1
     base, use, sigma = np.zeros(h.shape, np.float32), table, np.inf
-    if window < 3 or not table.any():
+    if width < 3 or not table.any():
         return np.zeros(height.shape), sigma
     z = np.where(table, h, np.float32(0))
     for _ in range(rounds):
-        share = uniform_filter(use.astype(np.float32), window, mode='constant')
-        mean = uniform_filter(np.where(use, z, np.float32(0)), window, mode='constant')
+        share = uniform_filter(use.astype(np.float32), width, mode='constant')
+        mean = uniform_filter(np.where(use, z, np.float32(0)), width, mode='constant')
         base = mean / np.maximum(share, LEAST_SHARE)
         off = np.abs(z - base)
         sigma = 1.4826 * float(np.median(off[use]))

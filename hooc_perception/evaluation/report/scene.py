@@ -4,7 +4,9 @@
 
 from dataclasses import dataclass, field
 
-from hooc_perception.core.segment.observe import observe, ObserveConfig, rectify
+from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Observation, PixelProbabilities, RectifiedView
 from hooc_perception.evaluation.matching import posed, PosedObject
 from hooc_perception.evaluation.scores import score_objects

@@ -66,7 +66,7 @@ def intrinsics(value, width, height, where):
     """
     Return the (3, 3) camera matrix of nine row-major numbers, checked to be usable.
 
-    A skew is kept: `core.segment.observe.rectify` takes it out with the lens distortion.
+    A skew is kept: `core.segment.rectify.rectify` takes it out with the lens distortion.
     """
     K = files.numbers(value, 9, where).reshape(3, 3)
     if K[0, 0] <= 0 or K[1, 1] <= 0 or K[1, 0] or any(K[2] != (0, 0, 1)):

@@ -4,7 +4,7 @@
 Camera messages <-> core types, exactly there and back.
 
 Poses travel as (translation, quaternion) in float64. Cameras are built from them by
-`core.geometry.canonical_pose`, as core.segment.observe.rectify does it, so that every process
+`core.geometry.canonical_pose`, as core.segment.rectify.rectify does it, so that every process
 has the same matrix as the one-process chain.
 """
 

@@ -5,7 +5,10 @@
 from dataclasses import replace
 
 from hooc_perception.core.geometry import canonical_pose, inverse, rays
-from hooc_perception.core.segment.observe import observe, ObserveConfig, rectify
+from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.foreground import observed_view
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import DepthView, RectifiedView
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -182,3 +185,21 @@ def test_a_view_with_hardly_any_table_keeps_its_pose(desk):
     for view, before in zip(observation.views, views, strict=True):
         np.testing.assert_array_equal(view.camera.T_world_camera, before.camera.T_world_camera)
         assert view.foreground.sum() > 1000
+
+
+@pytest.mark.parametrize('uneven_m', [0.0, 0.12])
+def test_a_view_is_rebuilt_to_the_last_bit_from_depth_pose_and_masks(desk, uneven_m):
+    views = [tilted(v, [0.006, -0.004, 0.01], 0.003) for v in rectified(desk)]
+    for view in observe(views, ObserveConfig(uneven_m=uneven_m,
+                                             workspace_radius_m=0.2)).views:
+        # As another process has them: copies of the bytes, the masks packed to bits.
+        T = np.frombuffer(view.camera.T_world_camera.tobytes()).reshape(4, 4).copy()
+        masks = [np.unpackbits(np.packbits(mask), count=mask.size).reshape(mask.shape)
+                 .astype(bool) for mask in (view.foreground, view.table)]
+        again = observed_view(replace(view.camera, T_world_camera=T), view.depth.copy(), *masks)
+        assert view.foreground.any() and np.isnan(view.background).any()
+        assert 0.1 < view.table.mean() < 0.95
+        for name in ('depth', 'background', 'foreground', 'table'):
+            a, b = getattr(view, name), getattr(again, name)
+            assert a.dtype == b.dtype and a.tobytes() == b.tobytes()
+        assert again.camera.T_world_camera.tobytes() == view.camera.T_world_camera.tobytes()

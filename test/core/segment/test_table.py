@@ -4,7 +4,8 @@
 
 from dataclasses import replace
 
-from hooc_perception.core.segment.observe import observe, ObserveConfig
+from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.uneven import uneven_table
 from hooc_perception.core.types import Camera, RectifiedView
 import numpy as np

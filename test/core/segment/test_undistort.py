@@ -4,8 +4,9 @@
 
 import cv2
 from hooc_perception.core.geometry import back_project
+from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.kernels.undistort import rectify_nearest
-from hooc_perception.core.segment.observe import ObserveConfig, rectify
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 import numpy as np

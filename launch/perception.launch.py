@@ -11,6 +11,7 @@ For ROS installations; elsewhere `hooc up` does the same.
 import os
 
 from ament_index_python.packages import get_package_share_directory
+from hooc_perception.chain import CHAIN
 from launch import LaunchDescription
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
 from launch.conditions import IfCondition
@@ -22,8 +23,6 @@ from launch_ros.event_handlers import OnStateTransition
 from launch_ros.events.lifecycle import ChangeState
 from lifecycle_msgs.msg import Transition
 import yaml
-
-CHAIN = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node')
 
 
 def lifecycle_node(name, namespace, parameters, autostart):

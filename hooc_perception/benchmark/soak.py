@@ -13,6 +13,7 @@ import time
 
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseArray, TransformStamped
+from hooc_perception.chain import CHAIN
 from hooc_perception.core.geometry import pose_from_matrix, stage_rng
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.reader import BagScene
@@ -25,7 +26,7 @@ from hooc_perception.ros.messages.conversions import (
 )
 from hooc_perception.ros.qos import qos
 from hooc_perception.supervisor.keeper import Keeper
-from hooc_perception.supervisor.supervisor import CHAIN, Supervisor
+from hooc_perception.supervisor.supervisor import Supervisor
 import numpy as np
 import psutil
 from sensor_msgs.msg import CameraInfo, Image

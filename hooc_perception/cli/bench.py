@@ -5,6 +5,7 @@
 import json
 from pathlib import Path
 
+from hooc_perception.chain import CHAIN
 from hooc_perception.errors import HoocError
 
 HELP = ('Measure the stages of the chain beside named baselines on one synthetic scene of 20 '
@@ -156,7 +157,6 @@ def _soak(args):
     """Run the nodes for a long time, print and draw their memory; return the exit code."""
     from hooc_perception.benchmark.soak import soak, write_plot
     from hooc_perception.cli.demo import bundle_root, MODEL, SCENE
-    from hooc_perception.supervisor.supervisor import CHAIN
     from hooc_perception.trained.folder import load_model_folder
     from tqdm import tqdm
     if not 0 < args.soak <= 1e5:

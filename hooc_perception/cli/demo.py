@@ -9,6 +9,7 @@ import shutil
 import sys
 import tempfile
 
+from hooc_perception.chain import PROFILES
 from hooc_perception.errors import HoocError
 
 HELP = ('Replay the bundled scene through the five nodes as separate processes, print the '
@@ -22,7 +23,7 @@ def add_arguments(parser):
     """Declare the arguments."""
     parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
                         help='folder for the results and the report (default: %(default)s)')
-    parser.add_argument('--profile', choices=('paper', 'best', 'fast'), default='best',
+    parser.add_argument('--profile', choices=PROFILES, default='best',
                         help='default: %(default)s')
     parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--timeout', type=float, default=300.0, metavar='S',

@@ -5,6 +5,7 @@
 from itertools import repeat
 import time
 
+from hooc_perception.chain import PROFILES
 from hooc_perception.cli import executor_option
 from hooc_perception.errors import HoocError
 
@@ -16,7 +17,7 @@ def add_arguments(parser):
     parser.add_argument('set', help='folder of a scene set or BOP dataset')
     parser.add_argument('--model', required=True, help='model folder that hooc train wrote')
     parser.add_argument('--out', required=True, help='results file to write')
-    parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
+    parser.add_argument('--profile', choices=PROFILES,
                         help='default: the profile that the model was trained for')
     parser.add_argument('--scene', nargs='+', action='extend',
                         metavar='ID', help='only these scenes')

@@ -5,6 +5,7 @@
 from pathlib import Path
 import sys
 
+from hooc_perception.chain import REPLAY
 from hooc_perception.errors import HoocError
 
 HELP = ('Play a bag as live cameras under /hooc. Waits until somebody listens to every camera, '
@@ -29,7 +30,7 @@ def run(args):
 
     from hooc_perception.io.bags.reader import BagScene
     from hooc_perception.ros.qos import qos
-    from hooc_perception.supervisor.supervisor import REPLAY, Supervisor
+    from hooc_perception.supervisor.supervisor import Supervisor
     from std_msgs.msg import String
     if not 0 <= args.rate <= 100 or not args.wait > 0:
         raise HoocError('--rate must be from 0 to 100 and --wait positive')

@@ -5,6 +5,7 @@
 from pathlib import Path
 import sys
 
+from hooc_perception.chain import CHAIN, INGESTION, PARSING, PROFILES, REPLAY, STAGES_OF
 from hooc_perception.errors import HoocError
 
 # Where the ranges of the nodes' parameters `seed` and `wait_for_answer_s` end.
@@ -21,7 +22,7 @@ def add_arguments(parser):
     parser.add_argument('--model', type=Path, required=True, metavar='MODEL',
                         help='model folder that hooc train wrote')
     parser.add_argument('--out', type=Path, required=True, metavar='RESULTS.json')
-    parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
+    parser.add_argument('--profile', choices=PROFILES,
                         help='default: the one the model was trained for')
     parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
@@ -113,7 +114,6 @@ def chain_parameters(args, model):
     """
     from hooc_perception.cli.overrides import overrides_of
     from hooc_perception.core import profiles
-    from hooc_perception.supervisor.supervisor import CHAIN
     seed = model.seed if args.seed is None else args.seed
     if not 0 <= seed <= LAST_SEED:
         raise HoocError(f'the seed is {seed}; give --seed a number from 0 to {LAST_SEED}')
@@ -122,11 +122,9 @@ def chain_parameters(args, model):
                   for name in CHAIN}
     overrides = overrides_of(getattr(args, 'set_parameter', ()))
     changed = profiles.with_overrides(profiles.profile(args.profile or model.profile), overrides)
-    of_stage = {'observe': CHAIN, 'classify': CHAIN[1:2], 'propose': CHAIN[2:3],
-                'parse': CHAIN[3:]}
     for key in overrides:
         stage, _, name = key.partition('.')
-        for node in of_stage[stage]:
+        for node in (n for n in CHAIN if stage in STAGES_OF[n]):
             # As the Config has it: 2 for a float became 2.0, which ROS insists on.
             parameters[node][key] = getattr(getattr(changed, stage), name)
     return parameters
@@ -134,7 +132,6 @@ def chain_parameters(args, model):
 
 def model_defaults(model):
     """Return {node: parameters} of the chain that hold where nobody says otherwise."""
-    from hooc_perception.supervisor.supervisor import CHAIN
     return {name: {'profile': model.profile, 'seed': model.seed} for name in CHAIN}
 
 
@@ -146,19 +143,19 @@ def play(bags, args, model):
         have them.
     """
     from hooc_perception.supervisor.bags import BagRunner, MATCH_TIMEOUT_S
-    from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
+    from hooc_perception.supervisor.supervisor import Supervisor
     from tqdm import tqdm
     parameters = chain_parameters(args, model)
     # A recorded frame set is complete however long it waits.
-    parameters['ingestion_node'].update(max_frame_age_s=0.0,
+    parameters[INGESTION].update(max_frame_age_s=0.0,
                                         wait_for_answer_s=min(args.timeout, LONGEST_WAIT_S))
     # Each bag is a scene of its own, whatever stood there in the last one.
-    parameters['parsing_node'].update(track_ttl_s=0.0)
+    parameters[PARSING].update(track_ttl_s=0.0)
     parameters[REPLAY] = {'match_timeout_s': MATCH_TIMEOUT_S}
     with Supervisor((*CHAIN, REPLAY), parameters, isolated=True, verbose=args.verbose,
                     params_file=args.params, defaults=model_defaults(model)) as supervisor:
         runner = BagRunner(supervisor, args.timeout, getattr(args, 'record', None))
-        used = supervisor.get_parameters(CHAIN[-1], ('profile', 'seed'))
+        used = supervisor.get_parameters(PARSING, ('profile', 'seed'))
         done = play_all(runner, tqdm(bags, desc='scenes', unit='scene', disable=None))
     return *done, used['profile'], used['seed']
 

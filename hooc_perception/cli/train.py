@@ -5,6 +5,7 @@
 from pathlib import Path
 import time
 
+from hooc_perception.chain import PROFILES
 from hooc_perception.cli import executor_option
 
 HELP = ('Train a model from the generic meshes and the cameras of a scene set. Its scenes are '
@@ -16,7 +17,7 @@ def add_arguments(parser):
     parser.add_argument('set', type=Path, metavar='SET', help='folder of a scene set')
     parser.add_argument('--out', type=Path, required=True, metavar='MODEL',
                         help='model folder to write; an older one is replaced')
-    parser.add_argument('--profile', choices=('paper', 'best', 'fast'), default='best')
+    parser.add_argument('--profile', choices=PROFILES, default='best')
     parser.add_argument('--seed', type=int, default=0,
                         help='same seed, same model (default: %(default)s)')
     parser.add_argument('--jobs', type=int, default=0, metavar='N',

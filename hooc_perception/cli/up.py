@@ -4,6 +4,8 @@
 
 from pathlib import Path
 
+from hooc_perception.chain import CHAIN, INGESTION, PROFILES
+
 HELP = ('Start the four nodes of the chain for live cameras and keep them up until '
         'interrupted. Cameras publish <camera>/depth/image_raw and camera_info under /hooc; '
         'answers come on /hooc/objects/poses and /hooc/objects/attributes.')
@@ -16,7 +18,7 @@ def add_arguments(parser):
     parser.add_argument('--cameras', type=Path, metavar='cameras.yaml',
                         help='names and poses of the cameras; without it, names come from the '
                              'model and poses from <camera>/extrinsics or /tf_static')
-    parser.add_argument('--profile', choices=('paper', 'best', 'fast'),
+    parser.add_argument('--profile', choices=PROFILES,
                         help='default: the one the model was trained for')
     parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
@@ -31,7 +33,7 @@ def run(args):
     """Run the command until it is interrupted."""
     from hooc_perception.cli.run import chain_parameters, model_defaults
     from hooc_perception.supervisor.keeper import Keeper
-    from hooc_perception.supervisor.supervisor import CHAIN, Supervisor
+    from hooc_perception.supervisor.supervisor import Supervisor
     from hooc_perception.trained.folder import load_model_folder
     model = load_model_folder(args.model)
     parameters = chain_parameters(args, model)
@@ -39,7 +41,7 @@ def run(args):
         poses = camera_poses(args.cameras)
         for name in CHAIN:
             parameters[name]['cameras'] = tuple(poses)
-        parameters['ingestion_node'].update(
+        parameters[INGESTION].update(
             {f'extrinsics.{name}': pose for name, pose in poses.items()})
     up = False
     try:

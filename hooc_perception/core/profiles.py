@@ -9,14 +9,12 @@ beyond it as far as it can, `fast` trades some of that for time.
 
 from dataclasses import dataclass, fields, replace
 
+from hooc_perception.chain import PROFILES, STAGES
 from hooc_perception.core.classification.classify import ClassifyConfig
 from hooc_perception.core.hypotheses.propose import ProposeConfig
 from hooc_perception.core.parsing.parse import ParseConfig
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.errors import HoocError
-
-NAMES = ('paper', 'best', 'fast')
-STAGES = ('observe', 'classify', 'propose', 'parse')
 
 
 @dataclass(frozen=True)
@@ -49,7 +47,7 @@ def profile(name):
                                              round_pool=10, round_per_category=3),
                        parse=ParseConfig(rounds=1, polish_steps=10, turn_steps=6, patience=2,
                                          finalists=4))
-    raise HoocError(f'there is no profile {name!r}; choose one of {", ".join(NAMES)}')
+    raise HoocError(f'there is no profile {name!r}; choose one of {", ".join(PROFILES)}')
 
 
 def with_overrides(chosen, overrides):

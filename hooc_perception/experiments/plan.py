@@ -11,12 +11,12 @@ a table of its own: the profile `best`, with its model, less one part at a time.
 from dataclasses import dataclass
 from pathlib import Path
 
+from hooc_perception.chain import PROFILES
 from hooc_perception.errors import HoocError
 from hooc_perception.experiments.ablations import ROW as ABLATIONS
 from hooc_perception.experiments.ablations import SWITCHES
 from hooc_perception.io.scenes.scene_set import load_scene_set
 
-PROFILES = ('paper', 'best', 'fast')
 BASELINES = ('fpfh', 'ppf')
 SCORED = PROFILES + BASELINES
 ROWS = SCORED + (ABLATIONS,)

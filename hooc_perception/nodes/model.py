@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the nodes take from the MODEL folder."""
 
+from hooc_perception.chain import topic_token
 from hooc_perception.errors import HoocError
-from hooc_perception.ros.outputs.found import topic_token
 from hooc_perception.trained.folder import load_model_folder
 
 

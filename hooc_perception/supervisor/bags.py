@@ -6,10 +6,10 @@ from pathlib import Path
 import shutil
 import sys
 
+from hooc_perception.chain import CHAIN, INGESTION, PARSING, REPLAY
 from hooc_perception.errors import HoocError
-from hooc_perception.supervisor.collector import Collector, INGESTION
+from hooc_perception.supervisor.collector import Collector
 from hooc_perception.supervisor.recorder import Recorder
-from hooc_perception.supervisor.supervisor import CHAIN, REPLAY
 
 MATCH_TIMEOUT_S = 30.0
 # Ingestion and the collector listen to every image; where all is recorded, the recorder too.
@@ -135,8 +135,8 @@ class BagRunner:
         if self._rig is not None:
             self._supervisor.bring_down(CHAIN)
         # A recorded frame set is whole however long its images take.
-        own = {'ingestion_node': {'camera_timeout_s': 0.0, 'explain_after_s': 0.0},
-               'parsing_node': {'max_instances': limit}}
+        own = {INGESTION: {'camera_timeout_s': 0.0, 'explain_after_s': 0.0},
+               PARSING: {'max_instances': limit}}
         for name in CHAIN:
             self._supervisor.set_parameters(
                 name, {**rig, 'wait_for_stages': True, **own.get(name, {})})

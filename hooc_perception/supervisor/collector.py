@@ -8,6 +8,7 @@ import json
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray
+from hooc_perception.chain import INGESTION
 from hooc_perception.core.types import Energy, ParsedScene, PixelProbabilities
 from hooc_perception.ros.messages.conversions import nanoseconds
 from hooc_perception.ros.messages.point_clouds import cloud_rows
@@ -18,8 +19,6 @@ from hooc_perception.ros.messages.stages import (
 from hooc_perception.ros.qos import qos
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import String
-
-INGESTION = 'ingestion_node'
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,13 @@
 from collections import Counter
 import time
 
+from hooc_perception.chain import CHAIN, PARSING
 from hooc_perception.ros.health.diagnostics import Diagnostics
 from hooc_perception.supervisor.empty_answer import EmptyAnswer
 from hooc_perception.supervisor.pulse import Pulse
 from hooc_perception.supervisor.shared_memory import free_orphans
 from hooc_perception.supervisor.shown import Shown
 from hooc_perception.supervisor.supervisor import (
-    CHAIN,
     RETRY_S,
     START_TIMEOUT_S,
     TRANSITION_TIMEOUT_S,
@@ -22,7 +22,6 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
-PARSING = 'parsing_node'
 # What the keeper has to know of the parsing node to speak in its place.
 _OF_PARSING = ('target_frame', 'use_sim_time', 'publish_detections', 'planning_scene',
                'parse.rounds', 'more_timeout_s')

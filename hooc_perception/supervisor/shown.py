@@ -5,10 +5,10 @@
 import json
 import re
 
+from hooc_perception.chain import topic_token
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.outputs.adapters.guard import messages_of
 from hooc_perception.ros.outputs.adapters.planning_scene import diff_message
-from hooc_perception.ros.outputs.found import topic_token
 from hooc_perception.ros.qos import qos
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray

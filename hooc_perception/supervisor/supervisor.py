@@ -7,6 +7,7 @@ import signal
 import sys
 import time
 
+from hooc_perception.chain import CHAIN
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.lifecycle.parameters import parameter_message
 from hooc_perception.supervisor.environment import full_namespace, isolate, use_large_segments
@@ -21,8 +22,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import parameter_value_to_python
 from rclpy.signals import SignalHandlerOptions
 
-CHAIN = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node')
-REPLAY = 'replay_node'
 STOP_GRACE_S = 5.0
 START_TIMEOUT_S = 60.0
 # Loading a model and compiling for the first time take long on a small machine.

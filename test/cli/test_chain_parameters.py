@@ -5,6 +5,7 @@
 from argparse import ArgumentParser
 from types import SimpleNamespace
 
+from hooc_perception.chain import CHAIN
 from hooc_perception.cli import run
 from hooc_perception.errors import HoocError
 import pytest
@@ -54,7 +55,7 @@ def test_what_is_not_asked_for_is_up_to_the_file_and_then_to_the_model(started, 
     # The results say what the nodes have worked with.
     assert run.play([], arguments(*words), MODEL) == ({}, {}, 'best', 7)
     (parameters, others), = started
-    for name in supervisor.CHAIN:
+    for name in CHAIN:
         assert {k: parameters[name][k] for k in ('profile', 'seed') if k in parameters[name]
                 } == given
         assert others['defaults'][name] == {'profile': 'fast', 'seed': 5}

@@ -4,12 +4,13 @@
 
 from dataclasses import fields
 
-from hooc_perception.core.profiles import NAMES, Profile, profile, with_overrides
+from hooc_perception.chain import PROFILES
+from hooc_perception.core.profiles import Profile, profile, with_overrides
 from hooc_perception.errors import HoocError
 import pytest
 
 
-@pytest.mark.parametrize('name', NAMES)
+@pytest.mark.parametrize('name', PROFILES)
 def test_every_profile_goes_by_its_name(name):
     assert profile(name).name == name
     assert profile(name) == profile(name)

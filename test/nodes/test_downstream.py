@@ -10,7 +10,7 @@ pytest.importorskip('rclpy')
 
 from hooc_perception.ros.health import downstream
 from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
-from hooc_perception.ros.qos import qos, TOPICS
+from hooc_perception.ros.qos import qos
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402
@@ -69,7 +69,3 @@ def test_who_is_missing_is_named_and_the_node_stays_inactive(bench, listener, mo
 def test_nobody_is_waited_for_unless_asked(bench):
     node = bench.add(Speaker)
     assert node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
-
-
-def test_the_topics_that_are_waited_for_are_in_the_table():
-    assert set(downstream.WORKERS) <= set(TOPICS)

@@ -34,10 +34,11 @@ def bundle(request):
 @pytest.fixture(scope='module')
 def played(bundle, tmp_path_factory):
     """Return (Answer, Answer of a second play, prints of two late subscribers, recording)."""
+    from hooc_perception.chain import CHAIN, REPLAY
     from hooc_perception.io.bags.reader import BagScene
     from hooc_perception.supervisor import environment
     from hooc_perception.supervisor.bags import BagRunner
-    from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
+    from hooc_perception.supervisor.supervisor import Supervisor
     from hooc_perception.trained.folder import load_model_folder
     bag, model = bundle
     before = dict(os.environ)

@@ -12,11 +12,12 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.chain import CHAIN, REPLAY
 from hooc_perception.ros.qos import qos
 from hooc_perception.supervisor import environment
 from hooc_perception.supervisor.keeper import Keeper
 from hooc_perception.supervisor.shared_memory import free_orphans
-from hooc_perception.supervisor.supervisor import CHAIN, REPLAY, Supervisor
+from hooc_perception.supervisor.supervisor import Supervisor
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 

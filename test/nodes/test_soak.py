@@ -146,7 +146,7 @@ def test_hundreds_of_sets_with_drop_outs_and_refusals_through_the_chain(bench, m
 @pytest.mark.slow
 def test_the_chain_of_processes_does_not_grow(repository, cheap, monkeypatch, tmp_path):
     from hooc_perception.benchmark.soak import soak, write_plot
-    from hooc_perception.supervisor.supervisor import CHAIN
+    from hooc_perception.chain import CHAIN
     for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE',
                  environment.TRANSPORTS_VARIABLE, *environment.FAST_DDS_VARIABLES):
         monkeypatch.setenv(name, '')

@@ -10,7 +10,7 @@ import yaml
 
 pytest.importorskip('rclpy')
 
-from hooc_perception.ros.qos import TOPICS
+from hooc_perception.chain import TOPICS
 
 DISPLAYS = {'MarkerArray': {'objects/markers'}, 'PoseArray': {'objects/poses'},
             'PointCloud2': {'views/points', 'scene/unexplained'},
@@ -37,7 +37,7 @@ def test_rviz_shows_our_topics_with_our_qos(repository):
         row = row_of(display['Topic']['Value'])
         assert row in DISPLAYS[kind]
         shown.add(row)
-        depth, latched = TOPICS[row]
+        depth, latched = TOPICS[row].depth, TOPICS[row].latched
         # A volatile reader of a latched topic would wait for the next answer.
         assert display['Topic']['Durability Policy'] == ('Transient Local' if latched
                                                          else 'Volatile')

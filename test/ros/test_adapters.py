@@ -65,7 +65,7 @@ class Node:
         return self.now
 
     def publisher(self, kind, topic):
-        from hooc_perception.ros.qos import TOPICS
+        from hooc_perception.chain import TOPICS
         assert topic in TOPICS
         return SimpleNamespace(publish=self.sent.setdefault(topic, []).append)
 

@@ -4,17 +4,9 @@
 
 import time
 
+from hooc_perception.chain import TOPICS
 from hooc_perception.errors import HoocError
 
-_ALL = ('classification_node', 'candidate_node', 'parsing_node')
-# Rows of the table of topics that carry a frame set on -> the nodes that need them.
-WORKERS = {
-    'views/<camera>/camera_info': _ALL, 'views/<camera>/extrinsics': _ALL,
-    'views/<camera>/depth_rect': _ALL, 'views/refused': ('ingestion_node',),
-    'pixels/probabilities': ('candidate_node', 'parsing_node'),
-    'candidates/poses': ('parsing_node',), 'candidates/attributes': ('parsing_node',),
-    'candidates/requests': ('candidate_node',), 'candidates/more/poses': ('parsing_node',),
-    'candidates/more/attributes': ('parsing_node',)}
 FOUND_TIMEOUT_S = 30.0
 _POLL_S = 0.01
 
@@ -29,7 +21,8 @@ def wait_for_workers(node, topics):
     :raises HoocError: where somebody is still missing after FOUND_TIMEOUT_S.
     """
     deadline = time.monotonic() + FOUND_TIMEOUT_S
-    needed = {topic: WORKERS[row] for topic, row in topics.items() if row in WORKERS}
+    needed = {topic: TOPICS[row].needed_by for topic, row in topics.items()
+              if TOPICS[row].needed_by}
     while missing := _missing(node, needed):
         if time.monotonic() > deadline:
             who = sorted(set().union(*missing.values()))

@@ -6,6 +6,7 @@ from contextlib import contextmanager
 import time
 
 from geometry_msgs.msg import TransformStamped
+from hooc_perception.chain import TOPICS
 from hooc_perception.core.geometry import back_project, pose_from_matrix
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import RectifiedView
@@ -28,8 +29,6 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
 EXPLAIN_AFTER_S = 3.0
-_MAKERS = {'views': 'ingestion_node', 'pixels': 'classification_node',
-           'candidates': 'candidate_node'}
 _KINDS = (('camera_info', CameraInfo), ('extrinsics', TransformStamped), ('depth_rect', Image))
 
 
@@ -111,7 +110,8 @@ class ViewInput:
         self._ignored = None        # stamp of the last set that was ignored
         self._observed = None       # monotonic s since which views wait for the other parts
         topics = [topic for _, topic in others.values()]
-        self._needed = [*(f'views/{name}/depth_rect' for name in names), *topics]
+        self._needed = {**{f'views/{name}/depth_rect': 'views/<camera>/depth_rect'
+                           for name in names}, **{topic: topic for topic in topics}}
         self._upstream = Upstream(node, topics)
         self.wait()
         node.steady_timer(1.0, self._on_timer)
@@ -149,7 +149,7 @@ class ViewInput:
         silent = [topic for topic in self._needed if not node.count_publishers(topic)]
         if not silent:
             return
-        makers = dict.fromkeys(_MAKERS[topic.partition('/')[0]] for topic in silent)
+        makers = dict.fromkeys(TOPICS[self._needed[topic]].publisher for topic in silent)
         sentence = (f'nobody publishes {", ".join(map(node.resolve_topic_name, silent))}, so '
                     f'nothing can be done; start {" and ".join(makers)}')
         if silent[0].startswith('views/'):

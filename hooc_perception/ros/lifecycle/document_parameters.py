@@ -14,6 +14,7 @@ import importlib
 import re
 import sys
 
+from hooc_perception.chain import PROFILES
 from hooc_perception.ros.lifecycle.stage_node import StageConfig
 
 _BLOCK = re.compile(r'(<!-- parameters: (\S+?):(\w+)(?: as (\w+))? -->\n).*?(<!-- end -->)',
@@ -51,7 +52,7 @@ def documented(text):
         profiles = None
         if stage:
             from hooc_perception.core.profiles import profile
-            profiles = {p: getattr(profile(p), stage) for p in ('paper', 'best', 'fast')}
+            profiles = {p: getattr(profile(p), stage) for p in PROFILES}
         return f'{start}{table(config, stage or "", profiles)}{end}'
     return _BLOCK.sub(fill, text)
 

@@ -6,8 +6,8 @@ from dataclasses import fields
 import difflib
 import importlib
 
-# The nodes whose parameters may stand in a section for all.
-NODES = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_node', 'replay_node')
+from hooc_perception.chain import NODES, STAGES
+
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 
@@ -38,7 +38,7 @@ def known_elsewhere():
             if isinstance(config, type) and config.__name__.endswith('Config'):
                 names |= {f.name for f in fields(config)}
     chosen = profile('best')
-    for stage in ('observe', 'classify', 'propose', 'parse'):
+    for stage in STAGES:
         names |= {f'{stage}.{f.name}' for f in fields(getattr(chosen, stage))}
     return names
 

@@ -9,6 +9,7 @@ import os
 import time
 import traceback
 
+from hooc_perception.chain import PROFILES
 from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.health.diagnostics import Diagnostics, WARN
@@ -23,7 +24,6 @@ from rclpy.clock import Clock, ClockType
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, TransitionCallbackReturn
 
-PROFILES = ('paper', 'best', 'fast')
 # What a node says last goes with its publishers: so long may its arrival take.
 FAREWELL_S = 1.0
 

@@ -52,7 +52,7 @@ sys.exit(run_node(Node))
 
 STUCK = HEAD + """
 import ctypes
-from hooc_perception.ros import spin
+from hooc_perception.ros.lifecycle import spin
 spin.END_GRACE_S = 1
 class Node(rclpy.node.Node):
     def __init__(self):

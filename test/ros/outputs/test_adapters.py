@@ -29,7 +29,7 @@ HALF = 0.5 ** 0.5
 def stubs(monkeypatch):
     """Return stub_messages.py with `install(package)` for this test."""
     spec = importlib.util.spec_from_file_location(
-        'stub_messages', Path(__file__).with_name('stub_messages.py'))
+        'stub_messages', Path(__file__).parents[1] / 'stub_messages.py')
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return SimpleNamespace(DEFINITIONS=module.DEFINITIONS, make=module.make, cdr=module.cdr,

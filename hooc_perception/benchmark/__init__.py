@@ -1,3 +1,3 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Speed and memory of every stage beside named baselines, measured in one run."""
+"""Speed, memory and robustness of every stage, as ratios to named baselines."""

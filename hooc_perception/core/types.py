@@ -177,7 +177,7 @@ class GenericModel:
 
     @property
     def longest_side(self):
-        """Return the longest side of the bounding box, metres: its size in METHOD.md."""
+        """Return the longest side of the bounding box, metres: its size in the paper."""
         return float(np.max(self.extents))
 
 

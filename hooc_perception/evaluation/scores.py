@@ -65,8 +65,8 @@ def score_objects(estimates, truths, models):
     """
     Return [ObjectScore] in the order of `truths`.
 
-    :param models: mapping category name -> GenericModel; its longest side is the size of
-        METHOD.md's criterion.
+    :param models: mapping category name -> GenericModel; its longest side is the size in
+        the paper's criterion of localization (section 6).
     """
     matched = {true: (est, metres) for est, true, metres in match_by_centre(estimates, truths)}
     out = []

@@ -1,3 +1,3 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""What is learnt before the first scene: forests from synthetic scenes."""
+"""Training: forests and the verifier, learned from synthetic scenes."""

@@ -1,3 +1,3 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Stage 2: class probabilities of foreground pixels."""
+"""Stage 2: category probabilities of foreground pixels."""

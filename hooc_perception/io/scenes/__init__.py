@@ -1,3 +1,3 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Recorded scenes, true poses, calibrations and results on disk."""
+"""Recorded scenes, ground truth, calibrations and results on disk."""

@@ -1,3 +1,3 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Diagnostics: who is silent, who is missing, who is busy."""
+"""Diagnostics: which node or camera is silent, missing or busy."""

@@ -1,3 +1,3 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""From messages to frame sets and views."""
+"""From camera messages to frame sets and views."""

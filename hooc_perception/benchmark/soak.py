@@ -25,8 +25,8 @@ from hooc_perception.ros.messages.conversions import (
     transform_message,
 )
 from hooc_perception.ros.qos import qos
-from hooc_perception.supervisor.keeper import Keeper
 from hooc_perception.supervisor.supervisor import Supervisor
+from hooc_perception.supervisor.watchdog import Watchdog
 import numpy as np
 import psutil
 from sensor_msgs.msg import CameraInfo, Image
@@ -111,7 +111,7 @@ class _Run:
 
     def __init__(self, supervisor, scene, rng):
         self._supervisor, self._rng, node = supervisor, rng, supervisor.node
-        self._keeper = Keeper(supervisor)
+        self._watchdog = Watchdog(supervisor)
         self._cameras, self._away = {}, {}
         for view in scene.views():
             name = view.camera.name
@@ -148,17 +148,17 @@ class _Run:
                 next_sample += SAMPLE_S
                 self._sample(now - start)
                 progress(now - start)
-            self._keeper.spin(0.01)
+            self._watchdog.spin(0.01)
 
     def settle(self, timeout_s):
         """Wait until what was sent is answered and counted."""
         deadline = time.monotonic() + timeout_s
         while time.monotonic() < deadline and (
                 len(self._stamps | self._refused) < self._sets()):
-            self._keeper.spin(0.05)
+            self._watchdog.spin(0.05)
         quiet = time.monotonic() + 2.5      # the counts come once a second
         while time.monotonic() < quiet:
-            self._keeper.spin(0.05)
+            self._watchdog.spin(0.05)
 
     def result(self):
         """Return the SoakResult."""
@@ -168,7 +168,7 @@ class _Run:
             np.array(self._times), np.array(self._answered),
             {n: np.array(m) for n, m in self._memory.items()},
             self._frames, self._sets(), len(self._stamps), len(self._refused - self._stamps),
-            sum(self._keeper.deaths.values()), Counter(self._reasons))
+            sum(self._watchdog.deaths.values()), Counter(self._reasons))
 
     def _sets(self):
         return int(self._values.get(('ingestion_node: views', 'sets'), 0))
@@ -192,7 +192,7 @@ class _Run:
             try:
                 rss = psutil.Process(process.pid).memory_info().rss
             except psutil.NoSuchProcess:
-                rss = np.nan        # its keeper brings it back
+                rss = np.nan        # the watchdog restarts it
             self._memory[name].append(rss / 1e6)
 
     def _on_answer(self, message):

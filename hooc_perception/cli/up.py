@@ -32,8 +32,8 @@ def add_arguments(parser):
 def run(args):
     """Run the command until it is interrupted."""
     from hooc_perception.cli.run import chain_parameters, model_defaults
-    from hooc_perception.supervisor.keeper import Keeper
     from hooc_perception.supervisor.supervisor import Supervisor
+    from hooc_perception.supervisor.watchdog import Watchdog
     from hooc_perception.trained.folder import load_model_folder
     model = load_model_folder(args.model)
     parameters = chain_parameters(args, model)
@@ -48,13 +48,13 @@ def run(args):
         with Supervisor(CHAIN, parameters, args.namespace, verbose=not args.quiet,
                         params_file=args.params,
                         defaults=model_defaults(model)) as supervisor:
-            keeper = Keeper(supervisor)
+            watchdog = Watchdog(supervisor)
             supervisor.bring_up()
             up = True
             topic = supervisor.node.resolve_topic_name('objects/poses')
             print(f'the nodes are up; objects come on {topic}; end with Ctrl-C', flush=True)
             while True:
-                keeper.spin(0.2)
+                watchdog.spin(0.2)
     except KeyboardInterrupt:
         # The way to end this command; an interrupt before it was up is one.
         if not up:

@@ -90,7 +90,7 @@ class NodeProcess:
         self._signal(signal.SIGTERM)
 
     def kill(self):
-        """End it at once; the keeper notices."""
+        """End it at once; the watchdog notices."""
         self._signal(signal.SIGKILL)
 
     def stop(self, deadline):

@@ -1,17 +1,19 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Camera messages <-> core types, exactly there and back.
+Lossless conversions between camera messages and core types.
 
-Poses travel as (translation, quaternion) in float64. Cameras are built from them by
-`core.geometry.canonical_pose`, as core.segment.rectify.rectify does it, so that every process
-has the same matrix as the one-process chain.
+Poses travel as (translation, quaternion) in float64. `core.geometry.canonical_pose` turns them
+into matrices, as rectification does, so that every process has the same matrix as a
+single-process run.
 """
 
 from array import array
+from collections.abc import Iterable
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose, PoseArray, TransformStamped
+from hooc_perception.core.arrays import AnyArray, Float32Array, Float64Array, UInt8Array
 from hooc_perception.core.geometry import canonical_pose, matrix_from_pose
 from hooc_perception.core.segment.checks import skew_trouble
 from hooc_perception.core.types import Camera
@@ -21,75 +23,75 @@ import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
 
-# Number of coefficients that the undistortion knows; the rest of a longer list must be zero.
+# Number of coefficients that undistortion uses; any further ones must be zero.
 _COEFFICIENTS = {'plumb_bob': 5, 'rational_polynomial': 8}
 
 
-def nanoseconds(stamp):
-    """Return the int nanoseconds of a builtin_interfaces/Time."""
+def nanoseconds(stamp: Time) -> int:
+    """Return a builtin_interfaces/Time in integer nanoseconds."""
     return stamp.sec * 1_000_000_000 + stamp.nanosec
 
 
-def time_message(stamp_ns):
-    """Return the builtin_interfaces/Time of int nanoseconds."""
+def time_message(stamp_ns: int) -> Time:
+    """Return integer nanoseconds as a builtin_interfaces/Time."""
     return Time(sec=int(stamp_ns // 1_000_000_000), nanosec=int(stamp_ns % 1_000_000_000))
 
 
-def header(stamp_ns, frame_id):
-    """Return a Header of int nanoseconds and a frame."""
+def header(stamp_ns: int, frame_id: str) -> Header:
+    """Return the Header with this stamp (ns) and frame."""
     return Header(stamp=time_message(stamp_ns), frame_id=frame_id)
 
 
-def message_bytes(pixels):
+def message_bytes(pixels: AnyArray) -> 'array[int]':
     """
-    Return the array('B') that a message's `data` wants, of any contiguous ndarray.
+    Return the bytes of an ndarray as the array('B') that the `data` field of a message takes.
 
-    Filling from a memoryview is several times faster than from bytes, and rclpy takes an
-    array without looking at every element.
+    Filling it from a memoryview is several times faster than from bytes, and rclpy accepts an
+    array without checking every element.
     """
     data = array('B')
     pixels = np.ascontiguousarray(pixels)
     if pixels.size:
-        data.frombytes(memoryview(pixels.reshape(-1).view(np.uint8)))
+        data.frombytes(pixels.reshape(-1).view(np.uint8).data)
     return data
 
 
-def image_message(pixels, encoding, head):
-    """Return an Image of a 2-D little-endian array; step is its packed row."""
+def image_message(pixels: AnyArray, encoding: str, head: Header) -> Image:
+    """Return the Image of an (H, W) little-endian array, with rows packed."""
     return Image(header=head, height=pixels.shape[0], width=pixels.shape[1], encoding=encoding,
                  is_bigendian=0, step=pixels.shape[1] * pixels.itemsize,
                  data=message_bytes(pixels))
 
 
-def depth_message(depth, head):
-    """Return the 32FC1 Image of (H, W) float32 metres, NaN = none."""
+def depth_message(depth: Float32Array, head: Header) -> Image:
+    """Return the 32FC1 Image of (H, W) float32 metres, NaN = no reading."""
     return image_message(np.asarray(depth, np.dtype('<f4')), METRES, head)
 
 
-def depth_from_message(message):
+def depth_from_message(message: Image) -> Float32Array:
     """
-    Return (H, W) float32 metres, NaN = none, of a depth Image.
+    Return (H, W) float32 metres, NaN = no reading, from a depth Image.
 
-    :raises HoocError: for an encoding or a layout that is no depth image.
+    :raises HoocError: if the encoding or the layout is not that of a depth image.
     """
     return decode_depth(message.data, message.height, message.width, message.encoding,
                         message.step, bool(message.is_bigendian))
 
 
-def labels_message(labels, head):
+def labels_message(labels: UInt8Array, head: Header) -> Image:
     """Return the mono8 Image of (H, W) uint8 class ids."""
     return image_message(np.asarray(labels, np.uint8), 'mono8', head)
 
 
-def labels_from_message(message):
-    """Return (H, W) uint8 class ids of a mono8 Image."""
+def labels_from_message(message: Image) -> UInt8Array:
+    """Return (H, W) uint8 class ids from a mono8 Image; HoocError for other encodings."""
     if message.encoding not in ('mono8', '8UC1'):
         raise HoocError(f'encoding {message.encoding!r} is not a label image; publish mono8')
     return decode_image(message.data, message.height, message.width, np.uint8, message.step)
 
 
-def camera_info_message(camera, head):
-    """Return the CameraInfo of a Camera (monocular: R = identity, P = [K 0])."""
+def camera_info_message(camera: Camera, head: Header) -> CameraInfo:
+    """Return the CameraInfo of a monocular Camera (R = identity, P = [K 0])."""
     P = np.hstack([camera.K, np.zeros((3, 1))])
     return CameraInfo(header=head, height=camera.height, width=camera.width,
                       distortion_model=camera.distortion_model,
@@ -98,7 +100,8 @@ def camera_info_message(camera, head):
                       p=P.reshape(-1))
 
 
-def transform_message(translation, rotation_xyzw, head, child_frame_id):
+def transform_message(translation: Iterable[float], rotation_xyzw: Iterable[float], head: Header,
+                      child_frame_id: str) -> TransformStamped:
     """Return T_parent_child as a TransformStamped; `head.frame_id` is the parent."""
     message = TransformStamped(header=head, child_frame_id=child_frame_id)
     t, q = message.transform.translation, message.transform.rotation
@@ -107,28 +110,28 @@ def transform_message(translation, rotation_xyzw, head, child_frame_id):
     return message
 
 
-def pose_of_transform(message):
-    """Return (translation (3,), rotation_xyzw (4,)) float64 of a TransformStamped, untouched."""
+def pose_of_transform(message: TransformStamped) -> tuple[Float64Array, Float64Array]:
+    """Return (translation (3,), rotation_xyzw (4,)) float64 of a TransformStamped, as it is."""
     t, q = message.transform.translation, message.transform.rotation
     return np.array([t.x, t.y, t.z]), np.array([q.x, q.y, q.z, q.w])
 
 
-def camera_from_messages(name, info, transform):
+def camera_from_messages(name: str, info: CameraInfo, transform: TransformStamped) -> Camera:
     """
     Return the Camera that a CameraInfo and its extrinsics describe.
 
-    :param transform: TransformStamped T_world_camera, camera optical frame to world.
-    :raises HoocError: where a calibration cannot be used, naming camera and field.
+    :param transform: T_world_camera, camera optical frame to world.
+    :raises HoocError: if the calibration is unusable; names the camera and the field.
     """
     K, D = np.array(info.k, np.float64).reshape(3, 3), np.array(info.d, np.float64)
     if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0 and K[2, 2] == 1):
         raise HoocError(f'camera_info of {name} holds no calibration (K = {info.k.tolist()}); '
-                        'calibrate the camera or point its driver to the calibration file')
+                        'calibrate the camera, or give its driver the calibration file')
     if trouble := skew_trouble(K):
         raise HoocError(f'camera_info of {name} has {trouble}')
     if info.width == 0 or info.height == 0:
         raise HoocError(f'camera_info of {name} says {info.width} x {info.height} pixels; the '
-                        'driver has to fill width and height')
+                        'driver must fill in width and height')
     model = info.distortion_model or 'plumb_bob'
     if model not in _COEFFICIENTS:
         raise HoocError(f'camera_info of {name} uses distortion model {model!r}; calibrate with '
@@ -147,13 +150,13 @@ def camera_from_messages(name, info, transform):
                   canonical_pose(matrix_from_pose(translation, rotation)), model)
 
 
-def is_rigid(translation, rotation_xyzw):
-    """Return whether (3,) and (4,) numbers are finite and a quaternion of norm 1."""
+def is_rigid(translation: Float64Array, rotation_xyzw: Float64Array) -> bool:
+    """Return whether a (3,) translation is finite and a (4,) quaternion has norm 1."""
     return bool(np.isfinite(translation).all() and abs(np.linalg.norm(rotation_xyzw) - 1) < 1e-2)
 
 
-def pose_message(translation, rotation_xyzw):
-    """Return the Pose of (3,) and (4,) float64, kept to the last bit."""
+def pose_message(translation: Float64Array, rotation_xyzw: Float64Array) -> Pose:
+    """Return the Pose of (3,) and (4,) float64, exact to the last bit."""
     pose = Pose()
     p, q = pose.position, pose.orientation
     p.x, p.y, p.z = np.asarray(translation).tolist()
@@ -161,13 +164,14 @@ def pose_message(translation, rotation_xyzw):
     return pose
 
 
-def pose_array_message(translation, rotation_xyzw, head):
-    """Return the PoseArray of (n, 3) and (n, 4) float64, kept to the last bit."""
+def pose_array_message(translation: Float64Array, rotation_xyzw: Float64Array,
+                       head: Header) -> PoseArray:
+    """Return the PoseArray of (n, 3) and (n, 4) float64, exact to the last bit."""
     return PoseArray(header=head, poses=[
         pose_message(t, q) for t, q in zip(translation, rotation_xyzw)])
 
 
-def poses_from_message(message):
+def poses_from_message(message: PoseArray) -> tuple[Float64Array, Float64Array]:
     """Return ((n, 3) translations, (n, 4) xyzw quaternions) float64 of a PoseArray."""
     rows = np.array([(p.position.x, p.position.y, p.position.z, p.orientation.x,
                       p.orientation.y, p.orientation.z, p.orientation.w) for p in message.poses])

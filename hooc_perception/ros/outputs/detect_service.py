@@ -55,7 +55,7 @@ class DetectService:
         return response
 
     def answer(self, scene):
-        """Reply with a FoundScene to everybody who called before its frame set was taken."""
+        """Reply with a DetectedScene to everybody who called before its frame set was taken."""
         if self._last_ns is not None and scene.stamp_ns < self._last_ns:
             for call in self._waiting:      # time was set back: all that comes now is newer
                 call.called_ns = scene.stamp_ns - 1
@@ -98,7 +98,7 @@ def refusal_json(reason):
 
 
 def scene_json(scene):
-    """Return the JSON of a FoundScene, as `detect` answers."""
+    """Return the JSON of a DetectedScene, as `detect` answers."""
     return json.dumps({
         'stamp_ns': scene.stamp_ns, 'frame': scene.frame,
         'objects': [{'id': o.id, 'category': o.category, 'score': o.score,

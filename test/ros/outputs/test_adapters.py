@@ -18,7 +18,7 @@ from hooc_perception.core.types import Candidates, Energy, ParsedScene
 from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_of
 from hooc_perception.ros.outputs.adapters.detections import covariance
 from hooc_perception.ros.outputs.adapters.guard import messages_of
-from hooc_perception.ros.outputs.found import found_scene, FoundScene
+from hooc_perception.ros.outputs.detected import detected_scene, DetectedScene
 import trimesh  # noqa: E402
 
 STAMP = 1_700_000_000_250_000_000
@@ -38,7 +38,7 @@ def stubs(monkeypatch):
 
 @pytest.fixture
 def scene():
-    """Return the FoundScene of a box and a can that lies."""
+    """Return the DetectedScene of a box and a can that lies."""
     from hooc_perception.objects.derive import derive
     rng = np.random.default_rng(0)
     models = (derive('tea box', trimesh.creation.box((0.1, 0.06, 0.08)), rng, 50, 50),
@@ -50,7 +50,7 @@ def scene():
                          np.array([0.75, 0.5], np.float32))
     some = np.ones(2, np.float32)
     parsed = ParsedScene(objects, Energy(0, 0, 0), some, some, some, np.ones(2, np.uint8), objects)
-    return found_scene(parsed, np.array([7, 9], np.uint32), models, STAMP, 'table')
+    return detected_scene(parsed, np.array([7, 9], np.uint32), models, STAMP, 'table')
 
 
 class Node:
@@ -114,7 +114,7 @@ def test_tf_has_a_frame_an_object(stubs, scene):
     assert xyz(can.transform.translation) == (-0.3, 0, 0.03)
     q = can.transform.rotation
     assert (q.x, q.y, q.z, q.w) == (HALF, 0, 0, HALF)
-    adapter.publish(FoundScene(STAMP, 'table', ()))
+    adapter.publish(DetectedScene(STAMP, 'table', ()))
     assert len(node.sent['/tf']) == 1
 
 
@@ -182,7 +182,7 @@ def told(stubs, node):
 
 def later(node, scene, seconds, keep):
     node.now += int(seconds * 1e9)
-    return FoundScene(node.now, 'table', tuple(scene.objects[i] for i in keep))
+    return DetectedScene(node.now, 'table', tuple(scene.objects[i] for i in keep))
 
 
 def test_what_is_gone_leaves_the_planning_scene_after_its_time(stubs, scene):

@@ -3,6 +3,6 @@
 """
 The answer in the languages of other packages, on ROS installations that have them.
 
-Each adapter is a class with `publish(scene)` (a FoundScene) and `clear(stamp_ns, frame)`; its
+Each adapter is a class with `publish(scene)` (a DetectedScene) and `clear(stamp_ns, frame)`; its
 message package is imported when it is made, so that nobody needs what they do not use.
 """

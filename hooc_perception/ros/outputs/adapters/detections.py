@@ -5,7 +5,7 @@
 from geometry_msgs.msg import PoseWithCovariance, Vector3
 from hooc_perception.ros.messages.conversions import pose_message
 from hooc_perception.ros.outputs.adapters.guard import messages_of
-from hooc_perception.ros.outputs.found import FoundScene
+from hooc_perception.ros.outputs.detected import DetectedScene
 import numpy as np
 from scipy.stats import chi2
 
@@ -19,17 +19,17 @@ class Detections:
         self._publisher = node.publisher(self._messages.Detection3DArray, 'objects/detections')
 
     def publish(self, scene):
-        """Publish a FoundScene."""
+        """Publish a DetectedScene."""
         self._publisher.publish(detections_message(scene, self._messages))
 
     def clear(self, stamp_ns, frame):
         """Take the last answer back."""
-        self.publish(FoundScene(stamp_ns, frame, ()))
+        self.publish(DetectedScene(stamp_ns, frame, ()))
 
 
 def detections_message(scene, messages):
     """
-    Return the Detection3DArray of a FoundScene.
+    Return the Detection3DArray of a DetectedScene.
 
     `class_id` is the category's name, `id` the instance. Each object has one hypothesis.
     """

@@ -15,7 +15,7 @@ class ObjectFrames:
         self._publisher = node.publisher(self._messages.TFMessage, '/tf')
 
     def publish(self, scene):
-        """Send the frames of a FoundScene."""
+        """Send the frames of a DetectedScene."""
         if scene.objects:
             self._publisher.publish(frames_message(scene, self._messages))
 
@@ -29,7 +29,7 @@ class ObjectFrames:
 
 
 def frames_message(scene, messages):
-    """Return the TFMessage of a FoundScene: the target frame is the parent of all objects."""
+    """Return the TFMessage of a DetectedScene: the target frame is the parent of all objects."""
     return messages.TFMessage(transforms=[
         transform_message(o.translation, o.rotation_xyzw, scene.header, o.name)
         for o in scene.objects])

@@ -32,7 +32,7 @@ class PlanningSceneDiffs:
             self.expire, type(self).__name__, 'what is gone stays in the planning scene')))
 
     def publish(self, scene):
-        """Add or replace the objects of a FoundScene and remove those whose time is over."""
+        """Add or replace the objects of a DetectedScene and remove those whose time is over."""
         now, self._frame = self._node.now_ns(), scene.frame
         shown = {o.name: now for o in scene.objects}
         # Time was set back (a looped bag): ids begin anew, and those of before never come again.
@@ -85,7 +85,7 @@ def diff_message(added, removed, head, messages):
 
 def collision_object(found, head, shape, messages):
     """
-    Return the CollisionObject of a FoundObject; its id is the object's name, as teacup_7.
+    Return the CollisionObject of a DetectedObject; its id is the object's name, as teacup_7.
 
     :param shape: 'mesh': the scaled generic model; 'box': its bounding box.
     """

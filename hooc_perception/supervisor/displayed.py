@@ -22,7 +22,7 @@ def optional_messages(package):
         return None     # the node that needs it has said so
 
 
-class Shown:
+class Displayed:
     """
     Listen to the answers, and remember what a parsing node that is gone cannot take back.
 

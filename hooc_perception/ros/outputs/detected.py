@@ -11,7 +11,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class FoundObject:
+class DetectedObject:
     """
     An object that stands on the table.
 
@@ -46,8 +46,8 @@ class FoundObject:
 
 
 @dataclass(frozen=True)
-class FoundScene:
-    """The objects (FoundObject) of a frame set, `stamp_ns`, in the target frame `frame`."""
+class DetectedScene:
+    """The objects (DetectedObject) of a frame set, `stamp_ns`, in the target frame `frame`."""
 
     stamp_ns: int
     frame: str
@@ -59,9 +59,9 @@ class FoundScene:
         return header(self.stamp_ns, self.frame)
 
 
-def found_scene(parsed, ids, models, stamp_ns, frame):
+def detected_scene(parsed, ids, models, stamp_ns, frame):
     """
-    Return the FoundScene of a ParsedScene.
+    Return the DetectedScene of a ParsedScene.
 
     :param ids: (n,) instance ids.
     :param models: tuple of GenericModel; class id c is models[c - 1].
@@ -69,8 +69,8 @@ def found_scene(parsed, ids, models, stamp_ns, frame):
     found = parsed.objects
     sigma_t, sigma_r = (np.full(len(found), np.nan) if sigma is None else sigma
                         for sigma in (parsed.sigma_t, parsed.sigma_r))
-    return FoundScene(stamp_ns, frame, tuple(
-        FoundObject(int(ids[i]), int(found.category[i]), float(found.score[i]),
+    return DetectedScene(stamp_ns, frame, tuple(
+        DetectedObject(int(ids[i]), int(found.category[i]), float(found.score[i]),
                     found.translation[i], found.rotation_xyzw[i], found.size[i].astype(float),
                     float(sigma_t[i]), float(sigma_r[i]), models[int(found.category[i]) - 1])
         for i in range(len(found))))

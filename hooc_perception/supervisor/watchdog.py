@@ -7,10 +7,10 @@ import time
 
 from hooc_perception.chain import CHAIN, PARSING
 from hooc_perception.ros.health.diagnostics import Diagnostics
-from hooc_perception.supervisor.empty_answer import EmptyAnswer
-from hooc_perception.supervisor.pulse import Pulse
+from hooc_perception.supervisor.displayed import Displayed
+from hooc_perception.supervisor.heartbeat import Heartbeat
+from hooc_perception.supervisor.retraction import Retraction
 from hooc_perception.supervisor.shared_memory import free_orphans
-from hooc_perception.supervisor.shown import Shown
 from hooc_perception.supervisor.supervisor import (
     RETRY_S,
     START_TIMEOUT_S,
@@ -22,7 +22,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
-# What the keeper has to know of the parsing node to speak in its place.
+# What the watchdog has to know of the parsing node to speak in its place.
 _OF_PARSING = ('target_frame', 'use_sim_time', 'publish_detections', 'planning_scene',
                'parse.rounds', 'more_timeout_s')
 _NEXT = {State.PRIMARY_STATE_UNCONFIGURED: Transition.TRANSITION_CONFIGURE,
@@ -32,7 +32,7 @@ REPEAT_S, SAID_FOR_S = 0.5, 3.0
 MANY_DEATHS = 5
 
 
-class Keeper:
+class Watchdog:
     """
     Keep the nodes of a Supervisor alive; call `spin` in place of Supervisor.spin.
 
@@ -61,9 +61,9 @@ class Keeper:
         self._recent = Counter()        # name -> deaths since it was last healthy
         self._alive_since = dict.fromkeys(supervisor.names, time.monotonic())
         self._revivals = {}             # name -> generator that brings it back
-        self._pulses = {name: Pulse(supervisor, name, hung_s) for name in supervisor.names}
+        self._heartbeats = {name: Heartbeat(supervisor, name, hung_s) for name in supervisor.names}
         self._empty, self._empty_until, self._said = None, 0.0, 0.0
-        self._shown = Shown(self._node)
+        self._shown = Displayed(self._node)
         self._parsing = {}              # parameters of the parsing node
         self._reset = self._node.create_client(Trigger, 'reset')
         self._node.create_subscription(ParameterEvent, '/parameter_events', self._on_event, 100)
@@ -73,7 +73,7 @@ class Keeper:
     def spin(self, seconds=0.05):
         """Serve callbacks for a moment, then do what is due for those who have died."""
         self._supervisor.spin_unchecked(seconds)
-        for name, pulse in self._pulses.items():
+        for name, pulse in self._heartbeats.items():
             if name not in self._revivals and not pulse.beats():
                 self._supervisor.processes[name].kill()
         for name in self._supervisor.dead():
@@ -104,7 +104,7 @@ class Keeper:
             refused = yield from self._bring_up(name)
             if refused is None:
                 self._alive_since[name] = time.monotonic()
-                self._pulses[name].start_anew()
+                self._heartbeats[name].start_anew()
                 self._node.get_logger().info(
                     f'{name} is active again, {time.monotonic() - began:.1f} s after its start')
                 return
@@ -125,13 +125,13 @@ class Keeper:
         pause = self._pause_of(name)
         tell = self.diagnostics.error if self._recent[name] >= MANY_DEATHS else (
             self.diagnostics.warn)
-        silent_s = self._pulses[name].silent_s
+        silent_s = self._heartbeats[name].silent_s
         how = (f'it ended unexpectedly ({process.manner_of_death()}; ' if not silent_s else
                f'it did not answer for {silent_s:.0f} s and was ended (')
         tell(name, 'died', f'{how}last words: '
              f'{process.last_words()}); it is started again in {pause:g} s, death '
              f'{self.deaths[name]} since the start')
-        self._pulses[name].start_anew()
+        self._heartbeats[name].start_anew()
         self._take_back(name)
         return pause
 
@@ -196,7 +196,7 @@ class Keeper:
         if name not in CHAIN or PARSING not in self._supervisor.names:
             return
         if self._empty is None:
-            self._empty = EmptyAnswer(self._node, self._shown,
+            self._empty = Retraction(self._node, self._shown,
                                       self._parsing['publish_detections'])
         self._empty.publish(self._parsing['target_frame'])
         self._said = time.monotonic()
@@ -239,7 +239,7 @@ class Keeper:
         if known['planning_scene'] != 'off':
             self._shown.watch_planning_scene()
         if self._hung_s:
-            self._pulses[PARSING].hung_s = (
+            self._heartbeats[PARSING].hung_s = (
                 self._hung_s + known['parse.rounds'] * known['more_timeout_s'])
 
     def _report(self):

@@ -14,8 +14,8 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from hooc_perception.ros.qos import qos
-from hooc_perception.supervisor.empty_answer import EmptyAnswer
-from hooc_perception.supervisor.shown import Shown
+from hooc_perception.supervisor.displayed import Displayed
+from hooc_perception.supervisor.retraction import Retraction
 from rclpy.clock import Clock  # noqa: E402
 from rclpy.node import Node  # noqa: E402
 from sensor_msgs.msg import PointCloud2  # noqa: E402
@@ -26,10 +26,10 @@ CLASSES = {'1': {'name': 'tea cup'}}
 
 
 def test_all_topics_are_emptied_and_every_marker_is_deleted(bench):
-    keeper = Node('keeper', namespace='/hooc', context=bench.context)
-    bench.nodes.append(keeper)
-    bench.executor.add_node(keeper)
-    shown = Shown(keeper)
+    watchdog = Node('watchdog', namespace='/hooc', context=bench.context)
+    bench.nodes.append(watchdog)
+    bench.executor.add_node(watchdog)
+    shown = Displayed(watchdog)
     speak = {topic: bench.peer.create_publisher(kind, topic, qos(topic)) for kind, topic in (
         (MarkerArray, 'objects/markers'), (String, 'objects/labels'))}
     speak['objects/labels'].publish(String(data=json.dumps(
@@ -47,7 +47,7 @@ def test_all_topics_are_emptied_and_every_marker_is_deleted(bench):
     bench.rest(0.2)
     for messages in heard.values():
         messages.clear()
-    empty = EmptyAnswer(keeper, shown)
+    empty = Retraction(watchdog, shown)
     for _ in range(2):      # who comes late has to hear of every marker, too
         empty.publish('rig')
         assert bench.spin(lambda: all(heard.values()) and not shown.markers), heard
@@ -106,7 +106,7 @@ def stubs(monkeypatch):
 
 def test_our_objects_leave_the_planning_scene_and_the_users_stay(stubs):
     node = Endpoints()
-    shown = Shown(node)
+    shown = Displayed(node)
     shown.watch_planning_scene()
     shown.watch_planning_scene()
     kind, hear = stubs.CollisionObject, node.takes['/planning_scene']
@@ -124,7 +124,7 @@ def test_our_objects_leave_the_planning_scene_and_the_users_stay(stubs):
     scene = stubs.PlanningScene(is_diff=True)
     scene.world.collision_objects = [thing('can_1', '', kind.REMOVE)]
     hear(scene)
-    empty = EmptyAnswer(node, shown, detections=True)
+    empty = Retraction(node, shown, detections=True)
     empty.publish('rig')
     diff, = node.sent['/planning_scene']
     assert diff.is_diff and diff.robot_state.is_diff
@@ -143,8 +143,8 @@ def test_without_their_packages_the_other_topics_are_emptied(monkeypatch):
     for package in ('moveit_msgs', 'vision_msgs'):
         monkeypatch.setitem(sys.modules, f'{package}.msg', None)
     node = Endpoints()
-    shown = Shown(node)
+    shown = Displayed(node)
     shown.watch_planning_scene()
-    EmptyAnswer(node, shown, detections=True).publish('rig')
+    Retraction(node, shown, detections=True).publish('rig')
     assert '/planning_scene' not in node.takes and 'objects/detections' not in node.sent
     assert not node.sent['/hooc/objects/poses'][0].poses

@@ -15,9 +15,9 @@ from geometry_msgs.msg import PoseArray  # noqa: E402
 from hooc_perception.chain import CHAIN, REPLAY
 from hooc_perception.ros.qos import qos
 from hooc_perception.supervisor import environment
-from hooc_perception.supervisor.keeper import Keeper
 from hooc_perception.supervisor.shared_memory import free_orphans
 from hooc_perception.supervisor.supervisor import Supervisor
+from hooc_perception.supervisor.watchdog import Watchdog
 from rosgraph_msgs.msg import Clock  # noqa: E402
 from visualization_msgs.msg import MarkerArray  # noqa: E402
 
@@ -53,7 +53,7 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
     with Supervisor((*CHAIN, REPLAY), cheap_chain(repository, cheap), isolated=True,
                     params_file=repository / 'config' / 'perception.yaml') as supervisor:
         supervisor.bring_up()
-        keeper = Keeper(supervisor, pause_s=0.1)
+        watchdog = Watchdog(supervisor, pause_s=0.1)
         heard, markers, latest = [], [], statuses(supervisor.node)
         supervisor.node.create_subscription(PoseArray, 'objects/poses', heard.append,
                                             qos('objects/poses'))
@@ -63,7 +63,7 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
         def until(condition, timeout_s=60.0):
             deadline = time.monotonic() + timeout_s
             while not condition() and time.monotonic() < deadline:
-                keeper.spin(0.05)
+                watchdog.spin(0.05)
             return condition()
 
         def said(name):
@@ -83,8 +83,8 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
                 (m.ns, m.id) for message in markers for m in message.markers
                 if m.action == m.DELETE and m.header.frame_id == 'table'}), markers
             assert until(lambda: said(name)), latest
-            assert until(lambda: not keeper.reviving() and heard[-1].poses), f'no {name}'
-        assert keeper.deaths == dict.fromkeys(CHAIN, 1)
+            assert until(lambda: not watchdog.reviving() and heard[-1].poses), f'no {name}'
+        assert watchdog.deaths == dict.fromkeys(CHAIN, 1)
         # The file that the node was started with again says 0.1.
         assert supervisor.get_parameters('ingestion_node', ['max_set_spread_s']) == {
             'max_set_spread_s': 0.25}
@@ -95,9 +95,9 @@ def test_the_keeper_speaks_in_the_frame_and_by_the_clock_of_the_dead(own_environ
     given = {'target_frame': 'bench', 'use_sim_time': True, 'parse.rounds': 3,
              'more_timeout_s': 50.0}
     with Supervisor(('parsing_node',), {'parsing_node': given}, isolated=True) as supervisor:
-        keeper, heard = Keeper(supervisor, pause_s=0.1, hung_s=100.0), []
+        watchdog, heard = Watchdog(supervisor, pause_s=0.1, hung_s=100.0), []
         # Three rounds, in each of which it may wait for others.
-        assert keeper._pulses['parsing_node'].hung_s == 250.0
+        assert watchdog._heartbeats['parsing_node'].hung_s == 250.0
         supervisor.set_parameters('parsing_node', {'target_frame': 'rig', 'parse.rounds': 1})
         clock = supervisor.node.create_publisher(Clock, '/clock', 1)
         supervisor.node.create_subscription(PoseArray, 'objects/poses', heard.append,
@@ -109,29 +109,29 @@ def test_the_keeper_speaks_in_the_frame_and_by_the_clock_of_the_dead(own_environ
             message = Clock()
             message.clock.sec = 1000
             clock.publish(message)
-            keeper.spin(0.02)
+            watchdog.spin(0.02)
         assert heard[-1].header.frame_id == 'rig' and heard[-1].header.stamp.sec == 1000
-        assert keeper._pulses['parsing_node'].hung_s == 150.0
+        assert watchdog._heartbeats['parsing_node'].hung_s == 150.0
 
 
 def test_a_node_that_hangs_is_ended_and_comes_back(own_environment):
     with Supervisor((REPLAY,), {REPLAY: {'bag': 'none'}}, isolated=True) as supervisor:
-        keeper = Keeper(supervisor, pause_s=0.1, hung_s=2.0)
+        watchdog = Watchdog(supervisor, pause_s=0.1, hung_s=2.0)
         first = supervisor.processes[REPLAY].pid
 
         def spin_until(condition):
             deadline = time.monotonic() + 30
             while not condition() and time.monotonic() < deadline:
-                keeper.spin(0.02)
+                watchdog.spin(0.02)
             assert condition()
 
         started = time.monotonic()
         spin_until(lambda: time.monotonic() - started > 4.0)
-        assert not keeper.deaths, 'a node that answers is left alone'
+        assert not watchdog.deaths, 'a node that answers is left alone'
         os.kill(first, signal.SIGSTOP)
         spin_until(lambda: supervisor.processes[REPLAY].pid != first)
-        assert keeper.deaths[REPLAY] == 1
-        (status,) = (s for s in keeper.diagnostics.statuses() if s.name.endswith(REPLAY))
+        assert watchdog.deaths[REPLAY] == 1
+        (status,) = (s for s in watchdog.diagnostics.statuses() if s.name.endswith(REPLAY))
         assert 'did not answer for 2 s' in status.message and 'memory' not in status.message
 
 
@@ -141,15 +141,15 @@ def test_a_node_that_keeps_dying_is_tried_less_and_less_often(own_environment, t
     (tmp_path / 'stillborn.py').write_text(
         'import sys\nprint("[ERROR] my disk is full", flush=True)\nsys.exit(3)\n')
     with Supervisor((REPLAY,), isolated=True) as supervisor:
-        keeper = Keeper(supervisor, pause_s=0.1, longest_s=0.5)
+        watchdog = Watchdog(supervisor, pause_s=0.1, longest_s=0.5)
         supervisor._modules[REPLAY] = 'stillborn'
         supervisor.processes[REPLAY].kill()
         deadline = time.monotonic() + 30
-        while keeper.deaths[REPLAY] < 6 and time.monotonic() < deadline:
-            keeper.spin(0.02)
-        assert keeper.deaths[REPLAY] == 6
-        assert keeper._pause_of(REPLAY) == 0.5
-        (status,) = (s for s in keeper.diagnostics.statuses() if s.name.endswith(REPLAY))
+        while watchdog.deaths[REPLAY] < 6 and time.monotonic() < deadline:
+            watchdog.spin(0.02)
+        assert watchdog.deaths[REPLAY] == 6
+        assert watchdog._pause_of(REPLAY) == 0.5
+        (status,) = (s for s in watchdog.diagnostics.statuses() if s.name.endswith(REPLAY))
         assert status.level == type(status).ERROR and 'my disk is full' in status.message
         assert 'exit code 3' in status.message
 

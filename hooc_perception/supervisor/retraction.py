@@ -6,21 +6,21 @@ import json
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.ros.outputs.adapters.detections import detections_message
-from hooc_perception.ros.outputs.found import FoundScene
+from hooc_perception.ros.outputs.detected import DetectedScene
 from hooc_perception.ros.outputs.object_output import empty_clouds, summary_json
 from hooc_perception.ros.qos import qos
-from hooc_perception.supervisor.shown import optional_messages
+from hooc_perception.supervisor.displayed import optional_messages
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from visualization_msgs.msg import Marker, MarkerArray
 
 
-class EmptyAnswer:
+class Retraction:
     """
     Publish empty objects in place of a parsing node that cannot do it itself.
 
     :param node: rclpy Node in the namespace of the chain, by whose clock they are stamped.
-    :param shown: the Shown that remembers what has to be taken back one by one.
+    :param shown: the Displayed that remembers what has to be taken back one by one.
     :param detections: whether `objects/detections` is one of the topics.
     """
 
@@ -51,7 +51,7 @@ class EmptyAnswer:
 
     def publish(self, frame):
         """Say that nothing is known to stand in the target frame; `objects/poses` goes last."""
-        scene = FoundScene(self._node.get_clock().now().nanoseconds, frame, ())
+        scene = DetectedScene(self._node.get_clock().now().nanoseconds, frame, ())
         head, shown = scene.header, self._shown
         attributes, unexplained = empty_clouds(head)
         messages = {

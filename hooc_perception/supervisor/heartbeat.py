@@ -10,7 +10,7 @@ from lifecycle_msgs.srv import GetState
 ASK_EVERY_S = 5.0
 
 
-class Pulse:
+class Heartbeat:
     """
     Ask a node for its state every few seconds, and mind how long no answer has come.
 

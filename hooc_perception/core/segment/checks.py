@@ -1,33 +1,36 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What can be seen to be wrong with a camera from one frame: pose, table, rig.
+Sanity checks of cameras from one frame: readings, pose, table, calibration, rig.
 
-Each function returns None, or one sentence that ends in the mend. The ingestion node says it
-while it runs, `hooc doctor` of a bag.
+Each check returns None, or one sentence that says what is wrong and how to fix it. The
+ingestion node reports it while running, `hooc doctor` for a bag.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from hooc_perception.core.arrays import Float32Array, Float64Array
 from hooc_perception.core.geometry import back_project
+from hooc_perception.core.types import Camera, RectifiedView
 import numpy as np
 
 FARTHEST_CAMERA_M = 10.0
-# Share of the focal length; what has more is a matrix whose numbers are in another order.
+# As a share of the focal length; more means that the numbers of the matrix are out of order.
 MAX_SKEW = 0.05
-# A table is believed from so many readings on (of every STRIDE-th row and column).
+# A table needs this many readings, counted in every STRIDE-th row and column.
 STRIDE, TABLE_READINGS = 4, 100
 
 
-def reading_trouble(depth):
-    """Say that a depth image (H, W), NaN = none, is empty; None where it is not."""
+def reading_trouble(depth: Float32Array) -> str | None:
+    """Check that a depth image (H, W) in metres, NaN = none, holds any reading."""
     if np.isfinite(depth).any():
         return None
     return 'it holds no reading at all (every pixel is 0, NaN or infinite); check the sensor'
 
 
-def pose_trouble(camera):
-    """Say what is absurd about where a Camera stands, None where it may be so."""
+def pose_trouble(camera: Camera) -> str | None:
+    """Check that a camera stands above the table, near it, and looks at it."""
     T = camera.T_world_camera
     away = float(np.linalg.norm(T[:3, 3]))
     if T[2, 3] <= 0:
@@ -44,12 +47,12 @@ def pose_trouble(camera):
     return None
 
 
-def table_trouble(view, band_m, radius_m):
+def table_trouble(view: RectifiedView, band_m: float, radius_m: float) -> str | None:
     """
-    Say that a RectifiedView does not show the table where its pose says, None where it does.
+    Check that a view shows the table where its pose says.
 
-    :param band_m: height around z = 0 that counts as table.
-    :param radius_m: horizontal distance from the origin within which to look.
+    :param band_m: height around z = 0 that counts as table, metres.
+    :param radius_m: horizontal distance from the origin within which to look, metres.
     """
     K = view.camera.K.copy()
     K[:2] /= STRIDE
@@ -68,19 +71,21 @@ def table_trouble(view, band_m, radius_m):
             f'{most:.2f} m); check its extrinsics, and that z = 0 is the table top')
 
 
-def skew_trouble(K):
-    """Say where a camera matrix (3, 3) has a skew that no sensor has, else return None."""
+def skew_trouble(K: Float64Array) -> str | None:
+    """Check that a camera matrix (3, 3) has no skew beyond what any sensor has."""
     if abs(K[0, 1]) <= MAX_SKEW * K[0, 0]:
         return None
     return (f'a skew of {K[0, 1]:g} pixels, more than {MAX_SKEW:g} of the focal length; '
             'check the order of its numbers or calibrate again')
 
 
-def rig_trouble(cameras, trained, shift_m=0.1, turn_deg=10.0):
+def rig_trouble(cameras: Sequence[Camera], trained: Sequence[Camera], shift_m: float = 0.1,
+                turn_deg: float = 10.0) -> str | None:
     """
-    Say how the cameras of a scene differ from those that a view-bound model was trained for.
+    Check that the cameras of a scene stand where a view-bound model was trained for them.
 
-    :param cameras, trained: sequences of Camera in the same order.
+    :param cameras, trained: in the same order.
+    :param shift_m, turn_deg: largest difference of a pose that is accepted.
     """
     if len(cameras) != len(trained):
         return (f'the model was trained for {len(trained)} cameras, but there are '
@@ -97,7 +102,7 @@ def rig_trouble(cameras, trained, shift_m=0.1, turn_deg=10.0):
     return None
 
 
-def same_calibration(a, b):
-    """Return whether two Cameras measure alike: size, intrinsics, distortion and pose."""
+def same_calibration(a: Camera, b: Camera) -> bool:
+    """Return whether two cameras have the same size, intrinsics, distortion and pose."""
     return ((a.width, a.height) == (b.width, b.height) and np.array_equal(a.K, b.K)
             and np.array_equal(a.D, b.D) and np.array_equal(a.T_world_camera, b.T_world_camera))

@@ -99,10 +99,11 @@ def _threshold(sigma_m: float, config: ObserveConfig) -> float:
 
 def _opened(mask: BoolArray) -> BoolArray:
     """Return the mask without specks: single pixels behind the table are noise."""
-    return ndimage.binary_opening(mask, np.ones((3, 3), bool))
+    return np.asarray(ndimage.binary_opening(mask, np.ones((3, 3), bool)), bool)
 
 
 def _tiny(mask: BoolArray) -> BoolArray:
     """Return the pixels of connected parts that are too small to be real."""
-    labels, n = ndimage.label(mask, np.ones((3, 3), int))
-    return np.bincount(labels.ravel(), minlength=n + 1)[labels] < FEWEST_PIXELS
+    labels = np.empty(mask.shape, np.int32)
+    ndimage.label(mask, np.ones((3, 3), int), output=labels)
+    return np.bincount(labels.ravel())[labels] < FEWEST_PIXELS

@@ -1,34 +1,37 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Fusion of repeated depth images of a scene, against noise, without what has moved."""
+"""Temporal fusion of depth images of one camera: less noise, without showing what has moved."""
 
 from collections import deque
 
+from hooc_perception.core.arrays import BoolArray, Float32Array, Int64Array, UInt8Array
 import numpy as np
 
-# Change is looked for in the means of blocks of so many pixels squared: they average the noise
-# of pixels, and what flickers at edges is a small part of a block.
+# Change is detected in the means of blocks of this many pixels squared: they average the noise
+# of pixels, and flicker at depth edges is a small part of a block.
 BLOCK = 8
-# A block has changed from so many times the noise on, its neighbours with it from so many on.
+# A block has changed if it differs by STRONG times the noise; its neighbours then need WEAK.
 STRONG, WEAK = 8.0, 2.0
-# More than this is no noise, less than this nobody can tell from it. [m]
+# Bounds of these thresholds: larger differences are never noise, smaller ones always. [m]
 LEAST_M, MOST_M = 0.004, 0.05
 
 
-def fuse_depth(stack, newest=None):
+def fuse_depth(stack: Float32Array,
+               newest: Int64Array | None = None) -> tuple[Float32Array, UInt8Array]:
     """
     Return the median of repeated readings and how many there were.
 
-    A pixel is read where at least half of the images read it: what only flickers is noise. With
-    an even number of readings the nearer of the two in the middle counts, since their mean may
-    lie on no surface.
+    A pixel is valid if at least half of the images have a reading there; anything rarer is
+    flicker. With an even number of readings the nearer of the two middle ones is taken, since
+    their mean may lie on no surface.
 
     :param stack: (N, H, W) float32 metres, NaN = none, oldest first.
-    :param newest: (H, W) integers: of each pixel only so many of the newest count; None = all.
+    :param newest: (H, W) integers, how many of the newest images count at each pixel; None =
+        all of them.
     :return: (depth (H, W) float32, NaN = none; count (H, W) uint8 of readings).
     """
     stack = np.asarray(stack, np.float32)
-    images = len(stack)
+    images: int | Int64Array = len(stack)
     if newest is not None:
         images = np.minimum(newest, len(stack))
         age = np.arange(len(stack) - 1, -1, -1)[:, None, None]
@@ -42,9 +45,9 @@ def fuse_depth(stack, newest=None):
     return depth, np.minimum(count, 255).astype(np.uint8)
 
 
-def block_means(depth):
+def block_means(depth: Float32Array) -> tuple[Float32Array, Int64Array]:
     """
-    Return the means of the readings in blocks, and the numbers of readings.
+    Return the mean of the readings in each block, and the number of readings.
 
     :param depth: (H, W) metres, NaN = none.
     :return: (means (h, w) float32, NaN = fewer readings than in a quarter of a block; (h, w) int).
@@ -61,32 +64,34 @@ def block_means(depth):
 
 class Fusion:
     """
-    The last images of one camera; what changes begins anew, block by block.
+    The last images of one camera; a block that changes starts over.
 
-    A block that differs from the images before shows the new image at once; where the next image
-    differs as well, those before are forgotten. So an object that is moved or taken away is not
-    shown by newer images, unless it rises hardly above the noise, and a block that flickers once
+    A block that differs from the earlier images shows the new image at once. If the next image
+    differs as well, the earlier ones are dropped. An object that is moved or removed therefore
+    disappears immediately, unless it barely exceeds the noise, and a block that flickers once
     loses nothing.
     """
 
-    def __init__(self):
-        """Begin without images."""
-        self._images = deque()      # (depth, block means), oldest first
-        # Of each block: how many of the newest images show what is there; whether the last one
-        # differed from those before, and whether by its depth.
-        self._newest = self._differs = self._shifted = None
+    def __init__(self) -> None:
+        """Start without images."""
+        self._images: deque[tuple[Float32Array, Float32Array]] = deque()
+        # Per block (h, w): how many of the newest images show the present scene; whether the
+        # last image differed from the earlier ones, and whether by its depth.
+        self._newest: Int64Array = np.zeros((0, 0), int)
+        self._differs: BoolArray = np.zeros((0, 0), bool)
+        self._shifted: BoolArray = np.zeros((0, 0), bool)
 
-    def __len__(self):
-        """Return how many images there are."""
+    def __len__(self) -> int:
+        """Return the number of images."""
         return len(self._images)
 
-    def forget(self):
-        """Forget all images."""
+    def forget(self) -> None:
+        """Drop all images."""
         self._images.clear()
 
-    def add(self, depth, frames):
+    def add(self, depth: Float32Array, frames: int) -> None:
         """
-        Take in an image.
+        Add an image.
 
         :param depth: (H, W) float32 metres, NaN = none.
         :param frames: how many images to keep.
@@ -107,20 +112,20 @@ class Fusion:
             self._newest = np.where(again, 1, np.minimum(self._newest + 1, frames))
         self._images.append((depth, means))
 
-    def fused(self):
-        """Return what `fuse_depth` returns, of each block's images that show what is there."""
+    def fused(self) -> tuple[Float32Array, UInt8Array]:
+        """Return `fuse_depth` of those images, per block, that show the present scene."""
         newest = np.where(self._shifted, 1, self._newest)
         depth = np.stack([d for d, _ in self._images])
         newest = newest.repeat(BLOCK, 0).repeat(BLOCK, 1)[:depth.shape[1], :depth.shape[2]]
         return fuse_depth(depth, newest)
 
 
-def shifted_blocks(means, before):
+def shifted_blocks(means: Float32Array, before: Float32Array) -> BoolArray:
     """
-    Return which blocks (h, w) lie at another depth than before, by the noise of the image itself.
+    Return which blocks (h, w) have moved in depth, relative to the noise of the image itself.
 
-    Noise grows with the square of the distance. What has changed is a small part of an image, or
-    all of it: then MOST_M says so.
+    Noise grows with the square of the distance. Its level is the median over the image, because
+    changes are a small part of it; if everything has changed, MOST_M detects it.
 
     :param means, before: (h, w) metres, NaN = none.
     """

@@ -4,7 +4,7 @@
 
 from dataclasses import replace
 
-from hooc_perception.core.arrays import Float64Array
+from hooc_perception.core.arrays import AnyArray, Float64Array
 from hooc_perception.core.geometry import back_project
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.types import Camera, RectifiedView
@@ -54,7 +54,7 @@ def _fitted_plane(points: Float64Array,
     """
     A = np.column_stack([points[:, 0], points[:, 1], np.ones(len(points))])
     # The median is robust against low objects in the band; the fit then narrows around it.
-    plane: Float64Array = np.array([0, 0, np.median(points[:, 2])])
+    plane: AnyArray = np.array([0, 0, np.median(points[:, 2])])
     sigma = band_m / 3
     for _ in range(ROUNDS):
         residual = points[:, 2] - A @ plane

@@ -2,14 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Brown-Conrady undistortion of depth images, nearest raw pixel."""
 
+from hooc_perception.core.arrays import Float32Array, Float64Array
 import numba as nb
 import numpy as np
 
 
 @nb.njit(cache=True)
-def rectify_nearest(depth, K, d):
+def rectify_nearest(depth: Float32Array, K: Float64Array, d: Float64Array) -> Float32Array:
     """
-    Return the undistorted image: each pixel takes the raw pixel that its ray falls on.
+    Return the undistorted image: each pixel takes the raw pixel that its ray hits.
+
+    The distortion model is that of sensor_msgs/CameraInfo (plumb_bob, rational_polynomial).
 
     :param depth: (H, W) float32, raw.
     :param K: (3, 3) float64 of both the raw and the rectified image, which has no skew.

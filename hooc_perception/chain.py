@@ -23,7 +23,8 @@ PROFILES = ('paper', 'best', 'fast')
 STAGES = ('observe', 'classify', 'propose', 'parse')
 # The stages whose parameters a node declares.
 STAGES_OF = {INGESTION: ('observe',), CLASSIFICATION: ('observe', 'classify'),
-             CANDIDATES: ('observe', 'propose'), PARSING: ('observe', 'parse'), REPLAY: ()}
+             CANDIDATES: ('observe', 'propose'),
+             PARSING: ('observe', 'propose', 'parse'), REPLAY: ()}
 
 
 @dataclass(frozen=True)
@@ -60,9 +61,6 @@ TOPICS = {
     'pixels/<camera>/labels': Topic(1, False, CLASSIFICATION),
     'candidates/poses': Topic(4, False, CANDIDATES, (PARSING,)),
     'candidates/attributes': Topic(4, False, CANDIDATES, (PARSING,)),
-    'candidates/requests': Topic(4, False, PARSING, (CANDIDATES,)),
-    'candidates/more/poses': Topic(4, False, CANDIDATES, (PARSING,)),
-    'candidates/more/attributes': Topic(4, False, CANDIDATES, (PARSING,)),
     'objects/poses': Topic(1, True, PARSING),
     'objects/attributes': Topic(1, True, PARSING),
     'objects/labels': Topic(1, True, PARSING),

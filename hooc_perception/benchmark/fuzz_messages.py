@@ -19,7 +19,6 @@ from hooc_perception.ros.messages.stages import (
     probabilities_from_message,
     probabilities_message,
 )
-from hooc_perception.ros.reproposal import parsed_request, request_text
 import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import Image
@@ -119,15 +118,7 @@ def _stage_case(rng, _):
     candidates_from_messages(poses, attributes, 1)
 
 
-def _request_case(rng, _):
-    """Give a damaged request of re-proposal to the candidate node's reader."""
-    n = int(rng.integers(0, 6))
-    candidates = Candidates(np.ones(n, np.uint16), np.zeros((n, 3)), np.zeros((n, 4)),
-                            np.ones((n, 3), np.float32), np.ones(n, np.float32))
-    parsed_request(damaged(request_text(5, 1, candidates).encode(), rng).decode(errors='replace'))
-
-
 def message_cases():
     """Return {kind: function(rng, folder)}."""
     return {'messages of a camera': _camera_case, 'bytes on the wire': _wire_case,
-            'messages of a stage': _stage_case, 'requests': _request_case}
+            'messages of a stage': _stage_case}

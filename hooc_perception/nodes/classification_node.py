@@ -5,6 +5,7 @@
 import sys
 import time
 
+from hooc_perception.chain import CLASSIFICATION, STAGES_OF
 from hooc_perception.core.classification.classify import classify, KIND_PAPER
 from hooc_perception.core.segment.checks import rig_trouble
 from hooc_perception.core.segment.observe import observe
@@ -25,7 +26,7 @@ class ClassificationNode(StageNode):
 
     def __init__(self, **kwargs):
         """Declare parameters."""
-        super().__init__('classification_node', StageConfig(), ('observe', 'classify'), **kwargs)
+        super().__init__(CLASSIFICATION, StageConfig(), STAGES_OF[CLASSIFICATION], **kwargs)
 
     def configure(self):
         """Load the classifier, build the endpoints."""

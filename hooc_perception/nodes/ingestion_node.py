@@ -7,6 +7,7 @@ import sys
 import time
 
 from geometry_msgs.msg import PoseArray
+from hooc_perception.chain import INGESTION, STAGES_OF
 from hooc_perception.core.config import param
 from hooc_perception.core.segment.checks import table_trouble
 from hooc_perception.core.segment.rectify import rectified_numbers, rectify
@@ -54,7 +55,7 @@ class IngestionNode(StageNode):
 
     def __init__(self, **kwargs):
         """Declare parameters."""
-        super().__init__('ingestion_node', IngestionConfig(), ('observe',), **kwargs)
+        super().__init__(INGESTION, IngestionConfig(), STAGES_OF[INGESTION], **kwargs)
         self.poses = PoseParameters(self)
 
     def configure(self):

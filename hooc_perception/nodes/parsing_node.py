@@ -8,6 +8,7 @@ import sys
 import time
 
 from geometry_msgs.msg import PoseArray
+from hooc_perception.chain import PARSING, STAGES_OF
 from hooc_perception.core.config import param
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.parsing.calibration import finished, with_sigmas
@@ -15,6 +16,7 @@ from hooc_perception.core.parsing.parse import parse
 from hooc_perception.core.parsing.tracking import TrackConfig, Tracker
 from hooc_perception.core.parsing.unexplained import unexplained_points
 from hooc_perception.core.parsing.verifier import Verifier
+from hooc_perception.core.pipeline import proposer
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.nodes.model import camera_names, model_of
 from hooc_perception.nodes.warm_up import warmed
@@ -30,7 +32,6 @@ from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_
 from hooc_perception.ros.outputs.detect_service import DetectService
 from hooc_perception.ros.outputs.detected import detected_scene
 from hooc_perception.ros.outputs.object_output import ObjectOutput
-from hooc_perception.ros.reproposal import MoreCandidates
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import SetBool, Trigger
 
@@ -43,9 +44,6 @@ class ParsingConfig(AdapterConfig, TrackConfig, StageConfig):
                                "limit, -1 takes the model's.", '', -1, 1000)
     sigmas: bool = param(True, 'Estimate sigma_t and sigma_r, for about 0.05 CPU seconds an '
                          'object.', runtime=True)
-    more_timeout_s: float = param(60.0, 'A round of re-proposal that the candidate node does not '
-                                  'answer within this time brings nothing.', 's', 0.1, 600.0,
-                                  runtime=True)
     keep_answer_s: float = param(0.0, 'An answer that no new one has followed for so long is '
                                  'taken back, as if by `reset`: nobody watches what it speaks '
                                  'of. 0 = it stays.', 's', 0.0, 86400.0, runtime=True)
@@ -58,7 +56,7 @@ class ParsingNode(StageNode):
 
     def __init__(self, **kwargs):
         """Declare parameters."""
-        super().__init__('parsing_node', ParsingConfig(), ('observe', 'parse'), **kwargs)
+        super().__init__(PARSING, ParsingConfig(), STAGES_OF[PARSING], **kwargs)
         self.detect = DetectService(self, lambda: None if self.enabled else (
             'frame sets are ignored: call enable with true'))
 
@@ -79,7 +77,6 @@ class ParsingNode(StageNode):
             'poses': (PoseArray, 'candidates/poses'),
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set,
             lambda: self.enabled)
-        self.more = MoreCandidates(self, len(model.models))
         self.adapters = adapters_of(self)
         self.answered = None        # monotonic s of the answer that stands, None: there is none
         self.steady_timer(0.5, self.on_timer)
@@ -87,12 +84,18 @@ class ParsingNode(StageNode):
         self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
 
     def try_out(self, views, probabilities, candidates, models):
-        """Parse a made-up scene."""
+        """Parse a made-up scene, and propose again for what its first object leaves."""
         observation = observe(views, self.parameters['observe'])
+        self.more(observation, probabilities, models)(candidates.take([0]), 1)
         parsed = parse(observation, probabilities, candidates, models, self.parameters['parse'],
                        stage_rng(self.config.seed, 'parse'), self.max_instances,
                        verifier=self.verifier)
         unexplained_points(observation, parsed.objects, models)
+
+    def more(self, observation, probabilities, models):
+        """Return the re-proposal that `parse` calls every round."""
+        return proposer(observation, probabilities, models, self.parameters['propose'],
+                        self.config.seed)
 
     def activate(self):
         """Say what the class ids mean."""
@@ -116,8 +119,7 @@ class ParsingNode(StageNode):
             observation, probabilities,
             candidates_from_messages(messages['poses'], messages['attributes'], n),
             self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
-            self.max_instances, self.more.asker(stamp_ns, self.config.more_timeout_s),
-            self.verifier)
+            self.max_instances, self.more(observation, probabilities, self.models), self.verifier)
         if self.config.sigmas:
             parsed = with_sigmas(
                 parsed, observation, probabilities, self.models, self.parameters['parse'],

@@ -23,8 +23,7 @@ from rclpy.parameter import Parameter, parameter_value_to_python
 from std_srvs.srv import Trigger
 
 # What the watchdog has to know of the parsing node to speak in its place.
-_OF_PARSING = ('target_frame', 'use_sim_time', 'publish_detections', 'planning_scene',
-               'parse.rounds', 'more_timeout_s')
+_OF_PARSING = ('target_frame', 'use_sim_time', 'publish_detections', 'planning_scene')
 _NEXT = {State.PRIMARY_STATE_UNCONFIGURED: Transition.TRANSITION_CONFIGURE,
          State.PRIMARY_STATE_INACTIVE: Transition.TRANSITION_ACTIVATE}
 # How often and how long the empty answer is said: subscribers need a moment to be found.
@@ -48,13 +47,12 @@ class Watchdog:
     :param longest_s: the pause never grows beyond this.
     :param quiet_s: a node that has lived so long is regarded as healthy again.
     :param hung_s: a node that has not answered for so long hangs: far longer than any frame set
-        takes. The parsing node has the time for which it may wait for candidates on top.
-        0 = never.
+        takes. 0 = never.
     """
 
     def __init__(self, supervisor, pause_s=1.0, longest_s=30.0, quiet_s=60.0, hung_s=120.0):
         """Watch from now on."""
-        self._supervisor, self._node, self._hung_s = supervisor, supervisor.node, hung_s
+        self._supervisor, self._node = supervisor, supervisor.node
         self._pause_s, self._longest_s, self._quiet_s = pause_s, longest_s, quiet_s
         self.diagnostics = Diagnostics(self._node)
         self.deaths = Counter()         # name -> deaths ever
@@ -230,7 +228,7 @@ class Watchdog:
                 self._adapt(changed)
 
     def _adapt(self, parameters):
-        """Do as the parsing node does: its frame, its clock, its topics, its patience."""
+        """Do as the parsing node does: its frame, its clock, its topics."""
         self._parsing.update((name, parameters[name]) for name in _OF_PARSING
                              if name in parameters)
         known = self._parsing
@@ -238,9 +236,6 @@ class Watchdog:
             self._node.set_parameters([Parameter('use_sim_time', value=known['use_sim_time'])])
         if known['planning_scene'] != 'off':
             self._shown.watch_planning_scene()
-        if self._hung_s:
-            self._heartbeats[PARSING].hung_s = (
-                self._hung_s + known['parse.rounds'] * known['more_timeout_s'])
 
     def _report(self):
         for name, process in self._supervisor.processes.items():

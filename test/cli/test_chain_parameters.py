@@ -75,3 +75,13 @@ def test_seeds_that_no_node_takes_are_refused_before_one_starts(started, seed):
     with pytest.raises(HoocError, match='the seed is .* from 0 to 2147483647'):
         run.play([], arguments('--seed', seed), MODEL)
     assert not started
+
+
+def test_a_changed_parameter_reaches_every_node_that_declares_it(started):
+    run.play([], arguments('--set-parameter', 'propose.samples=400',
+                           '--set-parameter', 'classify.stride=3'), MODEL)
+    (parameters, _), = started
+    for key, value, nodes in (('propose.samples', 400, {'candidate_node', 'parsing_node'}),
+                              ('classify.stride', 3, {'classification_node'})):
+        assert {name for name in CHAIN if key in parameters[name]} == nodes
+        assert all(parameters[name][key] == value for name in nodes)

@@ -10,6 +10,7 @@ to the last bit; and what the last stage answers comes out as promised.
 from dataclasses import replace
 import json
 
+from hooc_perception.core.hypotheses.propose import propose_more
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import DepthView
@@ -78,15 +79,20 @@ def test_stages_get_what_the_one_process_chain_gives_them(chain, folder):
     assert stages.given['parse'][3:] == (stage_rng(SEED, 'parse').random(), 1)
 
 
-def test_parsing_without_a_candidate_node_goes_on(chain):
-    stages, bench, send = chain
-    stages.turns = (1,)
-    bench.chain[3].set_parameters([Parameter('more_timeout_s', value=0.2)])
-    # In one thread the candidate node cannot work while parsing waits: nobody answers.
+def test_parsing_proposes_again_as_the_one_process_chain_does(bench, make_chain, folder):
+    own = {f'propose.{name}': value for name, value in {
+        'round_samples': 300, 'round_pool': 5, 'refine_steps': 2, 'polish_steps': 2}.items()}
+    stages, send = make_chain(parameters={3: own})
+    stages.turns = 1, 2
     send()
-    assert bench.spin(lambda: 'parse' in stages.given)
-    assert len(stages.asked[0]) == 0
-    assert bench.reasons(bench.chain[3])['parse'][0] == 'no_more_candidates'
+    assert bench.spin(lambda: 'parse' in stages.given, 60.0)
+    observation, probabilities, pool = stages.given['parse'][:3]
+    chosen, config = pool.take(stages.chosen), bench.chain[3].parameters['propose']
+    assert config.round_samples == 300
+    expected = [propose_more(observation, probabilities, folder.models, chosen, config,
+                             stage_rng(SEED, 'propose', turn)) for turn in stages.turns]
+    same_bits(stages.asked, expected)
+    assert any(len(more) for more in expected), 'the ball was left out'
 
 
 def test_the_answer_on_its_topics(chain, folder):

@@ -92,13 +92,10 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
 
 
 def test_the_keeper_speaks_in_the_frame_and_by_the_clock_of_the_dead(own_environment):
-    given = {'target_frame': 'bench', 'use_sim_time': True, 'parse.rounds': 3,
-             'more_timeout_s': 50.0}
+    given = {'target_frame': 'bench', 'use_sim_time': True}
     with Supervisor(('parsing_node',), {'parsing_node': given}, isolated=True) as supervisor:
         watchdog, heard = Watchdog(supervisor, pause_s=0.1, hung_s=100.0), []
-        # Three rounds, in each of which it may wait for others.
-        assert watchdog._heartbeats['parsing_node'].hung_s == 250.0
-        supervisor.set_parameters('parsing_node', {'target_frame': 'rig', 'parse.rounds': 1})
+        supervisor.set_parameters('parsing_node', {'target_frame': 'rig'})
         clock = supervisor.node.create_publisher(Clock, '/clock', 1)
         supervisor.node.create_subscription(PoseArray, 'objects/poses', heard.append,
                                             qos('objects/poses'))
@@ -111,7 +108,6 @@ def test_the_keeper_speaks_in_the_frame_and_by_the_clock_of_the_dead(own_environ
             clock.publish(message)
             watchdog.spin(0.02)
         assert heard[-1].header.frame_id == 'rig' and heard[-1].header.stamp.sec == 1000
-        assert watchdog._heartbeats['parsing_node'].hung_s == 150.0
 
 
 def test_a_node_that_hangs_is_ended_and_comes_back(own_environment):

@@ -85,14 +85,9 @@ def label_images(probabilities, observation):
     return images
 
 
-def candidates_messages(candidates, head, turn=0):
-    """
-    Return (PoseArray, PointCloud2) of Candidates; row i belongs to pose i.
-
-    :param turn: round of re-proposal, 0 = the first proposals.
-    """
-    rows = np.zeros(len(candidates), row_dtype((*CANDIDATE_COLUMNS, ('round', 'u1'))))
-    rows['round'] = turn
+def candidates_messages(candidates, head):
+    """Return (PoseArray, PointCloud2) of Candidates; row i belongs to pose i."""
+    rows = np.zeros(len(candidates), row_dtype(CANDIDATE_COLUMNS))
     rows['x'], rows['y'], rows['z'] = candidates.translation.T
     rows['score'], rows['category'] = candidates.score, candidates.category
     for axis, name in enumerate(SIZE):

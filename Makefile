@@ -24,7 +24,7 @@ help:
 	@echo '             JOBS=1'
 	@echo 'make bundle  make the bundled scene and model again'
 	@echo 'make lint    check the style'
-	@echo 'make lock    resolve requirements.in again (PYTHONS="python3.11 python3.12")'
+	@echo 'make lock    resolve pyproject.toml into requirements.txt again (PYTHONS="python3.11 python3.12")'
 
 setup:
 	@bash scripts/setup.sh

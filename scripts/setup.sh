@@ -18,8 +18,8 @@ say() { printf 'setup: %s\n' "$*" >&2; }
 die() { say "$*"; exit 1; }
 
 fingerprint() {
-  cat requirements.txt setup.py setup.cfg package.xml scripts/setup.sh scripts/ros_first.py \
-    | sha256sum | cut -d' ' -f1
+  cat requirements.txt pyproject.toml setup.py setup.cfg package.xml scripts/setup.sh \
+    scripts/ros_first.py | sha256sum | cut -d' ' -f1
 }
 
 # --- nothing to do? ---------------------------------------------------------------------------

@@ -43,7 +43,7 @@ ALLOWED = {
                   'hooc_perception.supervisor', 'hooc_perception.objects',
                   'hooc_perception.trained', 'hooc_perception.synthesis'},
     'experiments': {'numpy', 'hooc_perception.evaluation', 'hooc_perception.io.scenes'},
-    'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.io'},
+    'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.io', 'hooc_perception.extras'},
     'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',
                    'hooc_perception.ros', 'hooc_perception.nodes',
                    'hooc_perception.trained.folder', 'hooc_perception.io'},

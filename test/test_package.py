@@ -2,17 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a user or a ROS installation sees of the package: manifests, entry points, launch."""
 
+import ast
 import importlib
+from importlib.metadata import packages_distributions
 from pathlib import Path
-import re
+import runpy
 import subprocess
 import sys
+import tomllib
 from xml.etree import ElementTree
 
+from hooc_perception.extras import advice, EXTRA_OF
+from packaging.requirements import Requirement
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
 NODES = ['ingestion_node', 'classification_node', 'candidate_node', 'parsing_node', 'replay_node']
+PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
 MANIFEST = ElementTree.parse(ROOT / 'package.xml').getroot()
 
 
@@ -49,11 +55,10 @@ def test_node_executables_import(node):
     assert callable(importlib.import_module(f'hooc_perception.nodes.{node}').main)
 
 
-def test_setup_declares_every_executable():
-    text = (ROOT / 'setup.py').read_text()
-    assert 'hooc = hooc_perception.cli.main:main' in text
-    assert re.search(r'NODES = \((.*?)\)', text, re.S)
-    assert re.findall(r"'(\w+_node)'", text) == NODES
+def test_project_declares_every_executable():
+    assert PROJECT['scripts'] == {
+        'hooc': 'hooc_perception.cli.main:main',
+        **{node: f'hooc_perception.nodes.{node}:main' for node in NODES}}
 
 
 def test_launch_files_compile():
@@ -71,13 +76,62 @@ def test_launch_files_compile():
             names['generate_launch_description']()
 
 
-def test_every_import_of_the_package_is_pinned():
-    pinned = {line.split('==')[0].lower() for line in
-              (ROOT / 'requirements.txt').read_text().splitlines() if '==' in line}
-    wanted = {re.split(r'[\[=<>]', line)[0].lower() for line in
-              (ROOT / 'requirements.in').read_text().splitlines()
-              if line and not line.startswith('#')}
-    assert wanted <= pinned
+def distributions(requirements):
+    """Return the normalized names of the distributions that requirements name."""
+    return {Requirement(row).name.lower().replace('_', '-') for row in requirements}
+
+
+def imported():
+    """Return the names of the top-level modules that the package imports anywhere."""
+    found = set()
+    for path in (ROOT / 'hooc_perception').rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.partition('.')[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom):
+                found.add(node.module.partition('.')[0])
+    return found - set(sys.stdlib_module_names) - {'hooc_perception'}
+
+
+# Modules of a ROS installation that stand behind guards.
+GUARDED = {'ament_index_python', 'tf2_ros', 'tf2_msgs', 'vision_msgs', 'moveit_msgs'}
+
+
+def test_every_import_is_a_declared_dependency():
+    providers = packages_distributions()
+    missing = []
+    for module in sorted(imported() - GUARDED):
+        extra = EXTRA_OF.get(module)
+        rows = PROJECT['optional-dependencies'][extra] if extra else PROJECT['dependencies']
+        # The rebuilds of ROS come as one distribution per package, below those that we name.
+        if extra != 'ros' and module in providers and not (
+                distributions(rows) & {name.lower().replace('_', '-')
+                                       for name in providers[module]}):
+            missing.append((module, extra))
+    assert not missing
+
+
+def test_every_extra_is_declared():
+    assert set(EXTRA_OF.values()) <= set(PROJECT['optional-dependencies'])
+    assert {'ros', 'train', 'eval', 'view', 'dask'} <= set(PROJECT['optional-dependencies'])
+
+
+def test_advice_names_the_extra():
+    with pytest.raises(ModuleNotFoundError) as caught:
+        importlib.import_module('mujoco.no_such_part')
+    assert "pip install 'hooc_perception[train]'" in advice(caught.value)
+    assert advice(ImportError('broken', name='mujoco')) is None
+    assert advice(ModuleNotFoundError('gone', name='some_other_thing')) is None
+
+
+def test_every_dependency_is_pinned():
+    pins = [Requirement(line) for line in (ROOT / 'requirements.txt').read_text().splitlines()
+            if line and not line.startswith('#')]
+    versions = {pin.name.lower(): next(iter(pin.specifier)).version for pin in pins}
+    wanted = runpy.run_path(str(ROOT / 'scripts/lock.py'))['wanted']()
+    unmet = [row for row in map(Requirement, wanted)
+             if not row.specifier.contains(versions.get(row.name.lower().replace('_', '-'), '0'))]
+    assert not [str(row) for row in unmet]
 
 
 @pytest.mark.parametrize('script', ['scripts/setup.sh', '.ci/run'])

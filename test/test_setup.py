@@ -17,8 +17,8 @@ ROOT = Path(__file__).resolve().parent.parent
 @pytest.fixture
 def tree(tmp_path):
     """Return a copy of what setup.sh needs, with a stand-in for the virtual environment."""
-    for name in ('requirements.txt', 'setup.py', 'setup.cfg', 'package.xml', 'scripts/setup.sh',
-                 'scripts/ros_first.py'):
+    for name in ('requirements.txt', 'pyproject.toml', 'setup.py', 'setup.cfg', 'package.xml',
+                 'scripts/setup.sh', 'scripts/ros_first.py'):
         target = tmp_path / name
         target.parent.mkdir(exist_ok=True)
         shutil.copyfile(ROOT / name, target)
@@ -49,7 +49,7 @@ def test_second_run_does_nothing(tree):
     assert not [call for call in set_up(tree) if 'pip' in call]
 
 
-@pytest.mark.parametrize('name', ['requirements.txt', 'setup.py', 'package.xml'])
+@pytest.mark.parametrize('name', ['requirements.txt', 'pyproject.toml', 'setup.py', 'package.xml'])
 def test_a_change_sets_up_again(tree, name):
     set_up(tree)
     with open(tree / name, 'a') as file:

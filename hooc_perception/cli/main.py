@@ -15,6 +15,7 @@ import os
 import sys
 
 from hooc_perception.errors import HoocError
+from hooc_perception.extras import advice
 
 # One line each, kept here so that the overview imports none of the commands.
 COMMANDS = {
@@ -120,8 +121,9 @@ def main(argv=None):
     except Exception as error:
         if '--debug' in argv:
             raise
-        if isinstance(error, HoocError):
-            print(f'hooc: {error}', file=sys.stderr)
+        hint = advice(error) if isinstance(error, ImportError) else None
+        if isinstance(error, HoocError) or hint:
+            print(f'hooc: {hint or error}', file=sys.stderr)
         else:
             text = ' '.join(str(error).split()) or 'no message'
             print(f'hooc: unexpected {type(error).__name__}: {text} '

@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""`hooc parse`: the whole chain over a scene set in one process, no ROS."""
+"""`hooc parse`: the whole chain over a scene set or a bag in one process, no ROS."""
 
 from itertools import repeat
 import time
@@ -9,12 +9,12 @@ from hooc_perception.chain import PROFILES
 from hooc_perception.cli import executor_option
 from hooc_perception.errors import HoocError
 
-HELP = 'find the objects of a scene set, in one process without ROS'
+HELP = 'find the objects of a scene set or a bag, in one process without ROS'
 
 
 def add_arguments(parser):
     """Declare the arguments."""
-    parser.add_argument('set', help='folder of a scene set or BOP dataset')
+    parser.add_argument('set', help='folder of a scene set, a BOP dataset or a bag')
     parser.add_argument('--model', required=True, help='model folder that hooc train wrote')
     parser.add_argument('--out', required=True, help='results file to write')
     parser.add_argument('--profile', choices=PROFILES,
@@ -36,17 +36,19 @@ def run(args):
     from hooc_perception.cli.categories import category_gap, warn_of_gap
     from hooc_perception.cli.failures import tell_failures
     from hooc_perception.cli.overrides import overrides_of
-    from hooc_perception.cli.places import file_place, relative_place
+    from hooc_perception.cli.places import file_place
+    from hooc_perception.cli.sources import load_source, provenance
     from hooc_perception.core.pipeline import Pipeline
     from hooc_perception.core.profiles import profile, with_overrides
     from hooc_perception.executor import executor, spread
     from hooc_perception.io.scenes.results import scene_result, write_results
-    from hooc_perception.io.scenes.scene_set import load_scene_set
     from hooc_perception.trained.folder import load_model_folder
     from tqdm import tqdm
 
     out = file_place(args.out, '--out')
-    scene_set, folder = load_scene_set(args.set), load_model_folder(args.model)
+    folder = load_model_folder(args.model)
+    scene_set = load_source(args.set, folder)
+    of_file, of_scene = provenance(scene_set, args.model, out)
     names = [m.name for m in folder.models]
     chosen = with_overrides(profile(args.profile or folder.profile),
                             overrides_of(args.set_parameter))
@@ -70,10 +72,9 @@ def run(args):
                 continue
             results.append(scene_result(
                 scene.name, parsed, names, seconds, profile=chosen.name, seed=seed,
-                setting=setting, stage_seconds=parsed.seconds, **scene.world))
+                setting=setting, stage_seconds=parsed.seconds, **scene.world, **of_scene))
     if results or not failures:
-        write_results(out, scene_set.name, results, setting=setting,
-                      set=relative_place(args.set, out))
+        write_results(out, scene_set.name, results, setting=setting, **of_file)
         print(f'{len(results)} scenes, {sum(len(r["objects"]) for r in results)} objects -> '
               f'{args.out}')
     return tell_failures(failures)

@@ -5,6 +5,7 @@
 import ctypes
 import importlib
 import importlib.metadata
+import importlib.util
 import os
 from pathlib import Path
 import platform
@@ -15,6 +16,7 @@ import sys
 import tempfile
 
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING
+from hooc_perception.extras import advice
 
 PYTHONS = ((3, 11), (3, 12))
 # Module -> (distribution, what does not work without it).
@@ -76,9 +78,12 @@ def check_installation():
     yield from check_libraries()
     yield from check_packages()
     yield check_kernels()
-    yield check_gl()
-    yield check_ros()
-    yield check_shared_memory()
+    # What an extra brings is checked where it is installed.
+    if importlib.util.find_spec('pyrender'):
+        yield check_gl()
+    if importlib.util.find_spec('rclpy'):
+        yield check_ros()
+        yield check_shared_memory()
     yield from check_resources()
 
 
@@ -93,8 +98,16 @@ def check_python(version=None):
 
 
 def check_libraries(libraries=None):
-    """Yield a Finding for each system library (dict file name -> Debian package)."""
-    for name, package in (LIBRARIES if libraries is None else libraries).items():
+    """
+    Yield a Finding for each system library.
+
+    :param libraries: {file name: Debian package}; None stands for those of open3d and pyrender,
+        where one of the two is installed.
+    """
+    if libraries is None:
+        wanted = any(importlib.util.find_spec(name) for name in ('open3d', 'pyrender'))
+        libraries = LIBRARIES if wanted else {}
+    for name, package in libraries.items():
         try:
             ctypes.CDLL(name)
             yield Finding(OK, name, 'found')
@@ -110,6 +123,10 @@ def check_packages(packages=None):
         try:
             importlib.import_module(module)
         except Exception as error:      # a broken library may raise anything when imported
+            hint = advice(error) if isinstance(error, ImportError) else None
+            if hint:
+                yield Finding(WARNING, name, f'optional, for {need}: {hint}')
+                continue
             yield Finding(ERROR, name, f'does not import ({_one_line(error)}), so {need} will '
                           f'fail; {_mend(error)}')
             continue

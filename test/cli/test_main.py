@@ -88,6 +88,13 @@ def test_other_errors_are_one_line_without_a_trace(monkeypatch, capsys, error):
     assert '--debug' in text
 
 
+def test_a_missing_extra_is_named_in_one_sentence(monkeypatch, capsys):
+    install(monkeypatch, fail_with(ModuleNotFoundError("No module named 'mujoco'", name='mujoco')))
+    assert cli.main(['demo']) == 1
+    assert capsys.readouterr().err == (
+        "hooc: mujoco is not installed; run: pip install 'hooc_perception[train]'\n")
+
+
 @pytest.mark.parametrize('argv', [['--debug', 'demo'], ['demo', '--debug']])
 def test_debug_shows_the_trace(monkeypatch, argv):
     install(monkeypatch, fail_with(RuntimeError('why')))

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The check of an installation: true about this one, and clear about broken ones."""
 
+from hooc_perception import extras
 from hooc_perception.diagnosis import installation
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING, worst
 import pytest
@@ -44,6 +45,22 @@ def test_a_package_that_does_not_import(monkeypatch, tmp_path):
     assert [f.level for f in findings] == [ERROR, ERROR]
     assert 'pouring' in findings[0].text and 'libusb-1.0-0' in findings[0].text
     assert 'make setup' in findings[1].text
+
+
+def test_a_missing_extra_is_a_warning_that_names_it(monkeypatch):
+    monkeypatch.setitem(extras.EXTRA_OF, 'not_there', 'train')
+    finding, = installation.check_packages({'not_there': ('not-there', 'stirring')})
+    assert finding.level == WARNING and 'stirring' in finding.text
+    assert "pip install 'hooc_perception[train]'" in finding.text
+
+
+def test_without_extras_only_the_plain_installation_is_checked(monkeypatch):
+    for name in ('check_packages', 'check_resources'):
+        monkeypatch.setattr(installation, name, lambda: ())
+    for name in ('check_gl', 'check_ros', 'check_shared_memory'):
+        monkeypatch.delattr(installation, name)
+    monkeypatch.setattr(installation.importlib.util, 'find_spec', lambda name: None)
+    assert [f.subject for f in installation.check_installation()] == ['Python', 'compiled code']
 
 
 def test_a_version_that_is_not_the_pinned_one(monkeypatch):

@@ -106,6 +106,11 @@ class BagScene:
         """Return the tuple of TrueObject, None where the bag holds none."""
         return self.info['truth']
 
+    @property
+    def source_truth(self):
+        """Return the same: a bag's truth is already in the frame of its table."""
+        return self.truth
+
     def views(self, images=None):
         """
         Return the tuple of DepthView of one frame set, in camera order.

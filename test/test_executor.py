@@ -116,8 +116,8 @@ def test_a_cluster_says_the_same_about_the_stages(cluster, repository, small_set
     contents = []
     for name, more in (('here', []), ('there', ['--executor', f'dask={cluster}'])):
         out = tmp_path / f'{name}.json'
-        assert main(['evaluate', small_set, '--model', str(repository / 'models' / 'demo'),
-                     '--scene', 'a', '--stages', '--json', str(out), *more]) == 0
+        assert main(['stages', small_set, '--model', str(repository / 'models' / 'demo'),
+                     '--scene', 'a', '--json', str(out), *more]) == 0
         contents.append(without(json.loads(out.read_text()), 'seconds'))
     assert set(contents[0]['stages']) == {'a'}
     assert contents[0] == contents[1]

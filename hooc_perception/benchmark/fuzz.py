@@ -22,7 +22,7 @@ from hooc_perception.benchmark.fuzz_models import model_cases
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.errors import HoocError
 
-READ, REFUSED = 'read', 'refused'
+READ, REJECTED = 'read', 'rejected'
 # A case takes milliseconds, but the first that parses compiles the kernels, on a slow machine for
 # more than a minute. Longer than this is a hang.
 HANG_S = 240.0
@@ -59,7 +59,7 @@ def fuzz(cases, seed=0, progress=iter, source=OURS):
         for number in progress(range(cases)):
             worker = worker or _Worker(seed, source)
             kind, outcome, text = worker.run(number)
-            if outcome in (READ, REFUSED):
+            if outcome in (READ, REJECTED):
                 result.outcomes[kind, outcome] += 1
             else:
                 result.failures.append((number, kind, text))
@@ -83,7 +83,7 @@ def run_case(number, seed, kinds, folder):
         text = str(error)
         if not text.strip() or '\n' in text or len(text) > LONGEST_SENTENCE:
             return kind, 'bad sentence', f'no one sentence: {text[:300]!r}'
-        return kind, REFUSED, text
+        return kind, REJECTED, text
     except MemoryError:
         return kind, 'memory', f'more than {MEMORY_BYTES} bytes were asked for'
     except Exception as error:

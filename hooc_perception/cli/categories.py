@@ -2,15 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a model knows the categories of what it is applied to."""
 
+from collections.abc import Sequence
+from pathlib import Path
 import sys
 
 
-def category_gap(known, wanted, what):
+def category_gap(known: Sequence[str], wanted: Sequence[str], what: str | Path) -> str:
     """
     Return one sentence on how the categories of a model differ, '' where they agree.
 
-    :param known: names that the model knows; `wanted`: those of the set or bag.
-    :param what: names the set or bag.
+    :param known: categories of the model; `wanted`: those of the set or bag.
+    :param what: names the set or bag in the sentence.
     """
     parts = [f'{head} {", ".join(names[:5])}{" and more" if len(names) > 5 else ""}'
              for head, names in (
@@ -20,8 +22,8 @@ def category_gap(known, wanted, what):
             'was trained for it' if parts else '')
 
 
-def warn_of_gap(known, wanted, what):
-    """Say it in one line on standard error where categories differ."""
+def warn_of_gap(known: Sequence[str], wanted: Sequence[str], what: str | Path) -> None:
+    """Print one line on standard error where the categories differ."""
     gap = category_gap(known, wanted, what)
     if gap:
         print(f'[WARN] {gap}', file=sys.stderr)

@@ -1,40 +1,47 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""`hooc demo`: the bundled scene through the five nodes, beside the truth."""
+"""`hooc demo`: the bundled scene through the five nodes, beside the ground truth."""
 
-from argparse import ArgumentParser
+from argparse import ArgumentParser, Namespace
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 import shutil
+import site
 import sys
 import tempfile
+from typing import Any, TYPE_CHECKING
 
-from hooc_perception.chain import PROFILES
+from hooc_perception.cli import options
 from hooc_perception.errors import HoocError
 
+if TYPE_CHECKING:
+    from hooc_perception.core.types import GenericModel
+    from hooc_perception.evaluation.tables import Table
+    from hooc_perception.io.scenes.scene_set import TrueObject
+
 HELP = ('Replay the bundled scene through the five nodes as separate processes, print the '
-        'objects found beside the truth, and write a report with pictures.')
+        'objects found beside the ground truth, and write a report with pictures.')
 SCENE, MODEL = Path('bags') / 'demo', Path('models') / 'demo'
-# The bundled scene: of a twin that no benchmark uses.
+# The bundled scene is from a synthetic set that no benchmark uses.
 TWIN_SEED, TWIN_SCENE = 2016, '10_1'
 
 
-def add_arguments(parser):
+def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('--out', type=Path, default=Path('out/demo'), metavar='DIR',
                         help='folder for the results and the report (default: %(default)s)')
-    parser.add_argument('--profile', choices=PROFILES, default='best',
-                        help='default: %(default)s')
+    options.add_profile(parser, 'best')
     parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--timeout', type=float, default=300.0, metavar='S',
-                        help='how long the scene may take (default: %(default)g s)')
-    parser.add_argument('--verbose', action='store_true', help='show all that the nodes log')
+                        help='time limit, seconds (default: %(default)g)')
+    parser.add_argument('--verbose', action='store_true', help='show everything the nodes log')
     parser.add_argument('--make-bundle', action='store_true',
-                        help='first make the bundled scene and model again, from nothing but '
-                        'seeds (takes as long as hooc train)')
+                        help='first rebuild the bundled scene and model from their seeds (takes '
+                        'as long as hooc train)')
 
 
-def run(args):
+def run(args: Namespace) -> int:
     """Run the command; return the exit code."""
     from hooc_perception.cli.places import folder_place
     folder_place(args.out, '--out')
@@ -53,9 +60,10 @@ def run(args):
     entry = load_results(results)['scenes'][0]
     print('\n' + to_text(comparison(entry, BagScene(root / SCENE).truth, models)))
     print(f'\nresults: {results.resolve()}\nreport:  {(args.out / "report.html").resolve()}')
+    return 0
 
 
-def _run_arguments(args, root, results):
+def _run_arguments(args: Namespace, root: Path, results: Path) -> Namespace:
     """Return the arguments of `hooc run` for the bundle, with its own defaults."""
     from hooc_perception.cli import run as run_command
     parser = ArgumentParser()
@@ -68,30 +76,31 @@ def _run_arguments(args, root, results):
     return parser.parse_args([str(word) for word in words])
 
 
-def bundle_root(must_exist=True):
+def bundle_root(must_exist: bool = True) -> Path:
     """
     Return the folder that holds the bundled scene and model: the source tree, or share/.
 
-    :raises HoocError: where neither holds them and `must_exist`.
+    :raises HoocError: where no place holds them and `must_exist`.
     """
     source = Path(__file__).resolve().parents[2]
-    # colcon installs into <prefix>/lib/python3.x/site-packages
-    prefixes = [Path(sys.prefix), *list(source.parents)[2:3]]
+    # pip puts the data of a wheel below sys.prefix (below the user's base with --user), colcon
+    # below <prefix>, with the package in <prefix>/lib/python3.x/site-packages.
+    prefixes = [Path(sys.prefix), Path(site.getuserbase()), *list(source.parents)[2:3]]
     for place in [source, *(prefix / 'share' / 'hooc_perception' for prefix in prefixes)]:
         if (place / SCENE / 'metadata.yaml').is_file() and (place / MODEL).is_dir():
             return place
     if must_exist:
-        raise HoocError(f'the bundled scene and model are not in {source}; make them with '
+        raise HoocError(f'the bundled scene and model are not in {source}; create them with '
                         '"make bundle" in the source tree')
     return source
 
 
-def make_bundle(root):
+def make_bundle(root: Path) -> None:
     """
-    Write the bundled scene and model into `root` anew; the same code gives the same bundle.
+    Rebuild the bundled scene and model in `root`; the same code gives the same bundle.
 
     The model is trained on generic meshes and cameras, in the small size of profile `fast`; the
-    scene is not part of it.
+    scene is not part of the training.
     """
     from hooc_perception.io.bags.writer import write_bag
     from hooc_perception.io.scenes.scene_set import load_scene_set
@@ -109,9 +118,10 @@ def make_bundle(root):
     print(f'bundle: {root / SCENE} and {root / MODEL}, {size / 1e6:.1f} MB together')
 
 
-def comparison(entry, truth, models):
+def comparison(entry: Mapping[str, Any], truth: 'Sequence[TrueObject]',
+               models: 'Mapping[str, GenericModel]') -> 'Table':
     """
-    Return the Table of what was found beside the truth.
+    Return the Table of the objects found beside the ground truth.
 
     :param entry: one scene of a results file.
     :param truth: sequence of TrueObject.
@@ -131,14 +141,15 @@ def comparison(entry, truth, models):
                      f'{1000 * score.centre_m:.0f}' if found else None,
                      estimates[score.estimate].score if found else None))
     false = [estimate for i, estimate in enumerate(estimates) if i not in matched]
-    rows += [(estimate.category, 'not there', None, None, estimate.score) for estimate in false]
+    rows += [(estimate.category, 'false positive', None, None, estimate.score)
+             for estimate in false]
     count = len(scores)
     n_found = sum(score.estimate is not None for score in scores)
     n_placed = sum(score.localized for score in scores)
     return Table(
-        'Objects found beside the truth', ('object', 'found', 'localized', 'error mm', 'score'),
-        tuple(rows), (
+        'Objects found beside the ground truth',
+        ('object', 'found', 'localized', 'error mm', 'score'), tuple(rows), (
             '',
-            f'{n_found} of {count} found, {n_placed} localized, {len(false)} not there; '
-            f'{entry["seconds"]:.1f} s from the last image to the answer.',
+            f'{n_found} of {count} found, {n_placed} localized, {len(false)} false positives; '
+            f'{entry["seconds"]:.1f} s from the last image to the result.',
             "Localized: the centre is within half the generic model's size of the true one."))

@@ -1,33 +1,40 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""`hooc doctor`: what is wrong with an installation or a bag, and the mend."""
+"""`hooc doctor`: diagnoses an installation or a bag and suggests fixes."""
 
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hooc_perception.errors import HoocError
 
-HELP = ('Check this installation or, where bags are named, those bags, and say in one sentence '
-        'each what is wrong and how to mend it. The exit code is 1 where something will not work.')
+if TYPE_CHECKING:
+    from hooc_perception.diagnosis.finding import Finding
+
+HELP = ('Diagnose this installation or the given bags. Every finding is one sentence that says '
+        'what is wrong and how to fix it. The exit code is 1 if something will not work.')
 
 
-def add_arguments(parser):
+def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('bags', metavar='BAG', nargs='*', type=Path,
                         help='bag to check: a rosbag2 folder or an .mcap or .db3 file')
     parser.add_argument('--model', type=Path, metavar='MODEL',
-                        help='also say whether this model fits the cameras of the bags')
+                        help='also check whether this model fits the cameras of the bags')
     parser.add_argument('--salvage', type=Path, metavar='NEW_BAG',
-                        help='write what can be read of one damaged bag to a new one, check that')
+                        help='recover the readable part of one damaged bag into a new bag and '
+                        'check that')
 
 
-def run(args):
+def run(args: Namespace) -> int:
     """Run the command; return the exit code."""
     from hooc_perception.diagnosis.finding import ERROR, worst
-    findings = []
+    findings: list[Finding] = []
     if args.salvage and len(args.bags) != 1:
-        raise HoocError('--salvage takes one bag; name it')
+        raise HoocError('--salvage recovers exactly one bag; name one')
     if args.model and not args.bags:
-        raise HoocError('--model is held against bags; name one')
+        raise HoocError('--model is checked against bags; name at least one')
     if args.salvage:
         args.bags = [_salvage(args.bags[0], args.salvage)]
     if args.bags:
@@ -44,24 +51,24 @@ def run(args):
         findings = _show(check_installation())
     counts = {level: sum(f.level == level for f in findings) for level in ('error', 'warning')}
     print(f'{counts["error"]} errors, {counts["warning"]} warnings'
-          + ('' if any(counts.values()) else ': all is well'))
+          + ('' if any(counts.values()) else ': everything is fine'))
     return int(worst(findings) == ERROR)
 
 
-def _salvage(path, out):
-    """Write what can be read of a bag to a new one; return the latter."""
+def _salvage(path: Path, out: Path) -> Path:
+    """Write the readable part of a bag to a new one; return the path of that."""
     from hooc_perception.io.bags.salvage import salvaged, write_salvaged
     found = salvaged(path)
     for note in dict.fromkeys(found.notes):
         print(f'  {note}')
     if not found.messages:
-        raise HoocError(f'{path}: no message can be read any more; record again')
+        raise HoocError(f'{path}: not a single message can be read; record it again')
     write_salvaged(found, out)
-    print(f'{out}: {len(found.messages)} messages saved')
+    print(f'{out}: {len(found.messages)} messages recovered')
     return out
 
 
-def _show(findings):
+def _show(findings: 'Iterable[Finding]') -> 'list[Finding]':
     """Print findings as they come, since some checks take seconds; return them as a list."""
     shown = []
     for finding in findings:

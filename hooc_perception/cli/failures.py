@@ -1,13 +1,16 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes that came to nothing, beside others that did not."""
+"""Scenes that failed, beside others that succeeded."""
 
+from collections.abc import Mapping
 import sys
 
+from hooc_perception.errors import HoocError
 
-def tell_failures(failures):
+
+def tell_failures(failures: Mapping[str, HoocError]) -> int:
     """
-    Name every failed scene on standard error; return the exit code.
+    Print every failed scene on standard error; return the exit code.
 
     :param failures: {scene: HoocError}.
     """

@@ -6,7 +6,7 @@ from itertools import repeat
 import time
 
 from hooc_perception.chain import PROFILES
-from hooc_perception.cli import executor_option
+from hooc_perception.cli import options
 from hooc_perception.errors import HoocError
 
 HELP = 'find the objects of a scene set or a bag, in one process without ROS'
@@ -28,7 +28,7 @@ def add_arguments(parser):
                         help='also estimate how far off each pose may be')
     parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
                         help='change one parameter of the profile; may be repeated')
-    executor_option.add_argument(parser)
+    options.add_executor(parser)
 
 
 def run(args):

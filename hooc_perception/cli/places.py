@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where commands write: looked at before the work begins, not when it is done."""
+"""Output paths of the commands, checked before the work begins."""
 
 import os
 from pathlib import Path
@@ -8,11 +8,11 @@ from pathlib import Path
 from hooc_perception.errors import HoocError
 
 
-def file_place(path, option):
+def file_place(path: str | Path | None, option: str) -> Path | None:
     """
     Return the Path of a file to write, None for None.
 
-    :param option: what the user calls it, such as `--out`.
+    :param option: its option on the command line, such as `--out`.
     :raises HoocError: where no file can be written there.
     """
     if path is None:
@@ -23,7 +23,7 @@ def file_place(path, option):
     return _within_reach(path, path.parent, option)
 
 
-def folder_place(path, option):
+def folder_place(path: str | Path | None, option: str) -> Path | None:
     """Return the Path of a folder to write into, None for None; HoocError as `file_place`."""
     if path is None:
         return None
@@ -33,7 +33,7 @@ def folder_place(path, option):
     return _within_reach(path, path, option)
 
 
-def page_place(path, option):
+def page_place(path: str | Path | None, option: str) -> Path | None:
     """Return the Path of an HTML file, or of a folder for it; HoocError as `file_place`."""
     if path is not None and Path(path).suffix.lower() in ('.html', '.htm'):
         return file_place(path, option)
@@ -43,19 +43,19 @@ def page_place(path, option):
     return place
 
 
-def relative_place(path, file):
+def relative_place(path: str | Path, file: str | Path) -> str:
     """Return `path` as seen from the folder of `file`, so that both can be moved together."""
     return os.path.relpath(Path(path).resolve(), Path(file).resolve().parent)
 
 
-def _within_reach(path, folder, option):
+def _within_reach(path: Path, folder: Path, option: str) -> Path:
     """Return `path` if `folder` is, or can be made, a folder that may be written into."""
     while not os.path.lexists(folder):
         folder = folder.parent
     if not folder.is_dir():
-        raise HoocError(f'{option} {path} cannot be written, for {folder} is no folder; choose '
-                        'another place')
+        raise HoocError(f'{option} {path} cannot be written, because {folder} is not a folder; '
+                        'choose another place')
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise HoocError(f'{option} {path} cannot be written, for {folder} may not be changed; '
+        raise HoocError(f'{option} {path} cannot be written, because {folder} is write-protected; '
                         'choose another place')
     return path

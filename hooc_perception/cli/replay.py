@@ -2,30 +2,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc replay`: a bag as live cameras."""
 
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 import sys
+from typing import Any
 
 from hooc_perception.chain import REPLAY
 from hooc_perception.errors import HoocError
 
-HELP = ('Play a bag as live cameras under /hooc. Waits until somebody listens to every camera, '
-        'then sends the images as they were recorded, with stamps of now.')
+HELP = ('Play a bag as live cameras under /hooc: wait until every camera has a subscriber, then '
+        'publish the recorded images at their original pace with current stamps.')
 
 
-def add_arguments(parser):
+def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of `hooc replay`."""
-    parser.add_argument('bag', type=Path, metavar='BAG')
+    parser.add_argument('bag', type=Path, metavar='BAG',
+                        help='rosbag2 folder, .mcap or .db3 file')
     parser.add_argument('--rate', type=float, default=1.0, metavar='R',
-                        help='speed; 0 = as fast as the chain answers (default: %(default)g)')
+                        help='speed relative to the recording; 0 = as fast as the chain answers '
+                        '(default: %(default)g)')
     parser.add_argument('--loop', action='store_true',
                         help='start again at the end, one frame period after the last image')
     parser.add_argument('--wait', type=float, default=30.0, metavar='S',
-                        help='give up when nobody listens after so long (default: %(default)g s)')
+                        help='give up if no subscriber appears within S seconds (default: '
+                        '%(default)g)')
     parser.add_argument('--namespace', default='/hooc', help='default: %(default)s')
 
 
-def run(args):
-    """Run the command; return the exit code."""
+def run(args: Namespace) -> None:
+    """Play the bag until it has ended, or for ever with --loop."""
     import json
 
     from hooc_perception.io.bags.reader import BagScene
@@ -40,7 +45,7 @@ def run(args):
     parameters = {REPLAY: {'bag': str(args.bag.resolve()), 'rate': args.rate, 'loop': args.loop,
                            'match_timeout_s': args.wait}}
     with Supervisor((REPLAY,), parameters, args.namespace) as supervisor:
-        status = {}
+        status: dict[str, Any] = {}
         supervisor.node.create_subscription(
             String, 'replay/status', lambda message: status.update(json.loads(message.data)),
             qos('replay/status'))
@@ -51,6 +56,6 @@ def run(args):
         if status['state'] == 'failed':
             supervisor.wait_a_moment()
             raise HoocError(supervisor.processes[REPLAY].last_words())
-        # Whoever has not taken the last images yet can still get them.
+        # Subscribers that have not received the last images yet still can.
         supervisor.wait_a_moment(1.0)
     print(f'{status["images"]} images sent')

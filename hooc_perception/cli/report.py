@@ -2,40 +2,66 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc report`: results as one self-contained HTML page."""
 
+from argparse import ArgumentParser, Namespace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-import sys
-from types import SimpleNamespace
+from typing import Any, TYPE_CHECKING
 
+from hooc_perception.cli import options
 from hooc_perception.errors import HoocError
 
+if TYPE_CHECKING:
+    from hooc_perception.core.types import DepthView, GenericModel
+    from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.trained.folder import ModelFolder
+
 HELP = ('Write results as one self-contained HTML page: every view with the measured and the '
-        'explained depth, outlines of the objects, residuals, energies, and the truth beside it '
-        'where it is known.')
+        'rendered depth, outlines of the objects, residuals, energies, and the ground truth where '
+        'it is known.')
 
 
-def add_arguments(parser):
+def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('results', metavar='RESULTS.json',
-                        help='results of `hooc parse` or `hooc run`')
+                        help='results of hooc parse, hooc run or hooc baseline')
     parser.add_argument('--set', metavar='SET',
-                        help='the scene set that the results are of (default: the set, or the '
-                        'bags, that the results name)')
+                        help='scene set of the results (default: the set or the bags that the '
+                        'results name)')
     parser.add_argument('--model', metavar='MODEL',
-                        help='model folder: adds the most likely class of every pixel')
+                        help='model folder: adds a picture of the most likely class of every '
+                        'pixel')
     parser.add_argument('--candidates', action='store_true',
-                        help='run the chain of --model again, to list the rejected candidates')
+                        help='run the chain of --model again to list the rejected candidates')
     parser.add_argument('--out', metavar='PATH', default='report.html',
                         help='HTML file, or folder for report.html (default: %(default)s)')
     parser.add_argument('--rerun', metavar='FILE.rrd',
                         help='also write the scenes as a recording for the Rerun viewer (needs '
                         'rerun-sdk)')
-    parser.add_argument('--scene', metavar='ID', action='append', default=[],
-                        help='show this scene only (repeatable)')
+    options.add_scene(parser)
 
 
-def run(args):
-    """Run the command; return the exit code."""
+@dataclass(frozen=True)
+class _Source:
+    """
+    What the results are of: a scene set, or recorded bags.
+
+    :ivar place: names it in warnings.
+    :ivar scenes: its scenes; `views` returns the DepthViews of a scene for its results entry.
+    :ivar models: {category: GenericModel}.
+    """
+
+    name: str
+    place: str | Path
+    scenes: Sequence[Any]
+    models: Mapping[str, 'GenericModel']
+    views: Callable[[Any, dict[str, Any]], Sequence['DepthView']]
+
+
+def run(args: Namespace) -> None:
+    """Write the page and, where it is asked for, the recording."""
     from hooc_perception.cli.places import file_place, page_place
+    from hooc_perception.cli.scoring import warn_of_others
     from hooc_perception.evaluation.matching import in_frame_of
     from hooc_perception.evaluation.report.page import write_report
     from hooc_perception.evaluation.report.recording import rerun_sdk, write_recording
@@ -55,9 +81,7 @@ def run(args):
     source = _source(args, results, folder)
     entries, others = scenes_in_common(results, {s.name for s in source.scenes}, args.results,
                                        source.place)
-    if others and not args.scene:
-        print(f'[WARN] {args.results}: {others} not in {source.place} and left out',
-              file=sys.stderr)
+    warn_of_others(args.results, others if not args.scene else '', source.place)
     shown = [scene for scene in source.scenes if scene.name in entries]
     extras = None
     if folder:
@@ -71,19 +95,18 @@ def run(args):
         scenes.append(report_scene(entry, views, source.models, scene.truth, **more))
     notes = [f'Set {source.name}' + ''.join(
         f', {key} {results[key]}' for key in ('profile', 'seed', 'setting') if key in results)]
-    title = f'What stands on the table: {results["dataset"]}'
+    title = f'Objects on the table: {results["dataset"]}'
     written = [write_report(args.out, scenes, title, notes)]
     if args.rerun:
         written.append(write_recording(args.rerun, scenes, title))
     for path in written:
         print(f'{path}: {len(scenes)} scene{"s" if len(scenes) != 1 else ""}, '
               f'{path.stat().st_size / 1e6:.1f} MB')
-    return 0
 
 
-def _source(args, results, folder):
+def _source(args: Namespace, results: dict[str, Any], folder: 'ModelFolder | None') -> _Source:
     """
-    Return what the results are of: name, place, scenes and models {category: GenericModel}.
+    Return the source of the results.
 
     That is --set, else the set or the bags that the results name, relative to their own file.
     """
@@ -96,32 +119,31 @@ def _source(args, results, folder):
         scene_set = load_scene_set(place).selected(args.scene)
         models = ({model.name: model for model in folder.models} if folder
                   else scoring_models(scene_set))
-        return SimpleNamespace(name=scene_set.name, place=place, scenes=scene_set.scenes,
-                               models=models, views=lambda scene, entry: scene.depth())
+        return _Source(scene_set.name, place, scene_set.scenes, models,
+                       lambda scene, entry: scene.depth())
     from hooc_perception.io.bags.reader import BagScene
     wanted = args.scene or [entry['scene'] for entry in results['scenes']]
     bags = {entry['scene']: bag for entry in results['scenes']
             if entry['scene'] in wanted and (bag := _named(base, entry, 'bag'))}
     model = _named(base, results, 'model')
-    if not bags or not (folder or model):
-        raise HoocError(f'{args.results} does not say which set or bags it is of, or they have '
-                        'been moved; name the set with --set')
-    models = (folder or load_model_folder(model)).models
-    return SimpleNamespace(
-        name=results['dataset'], place='its bags', models={m.name: m for m in models},
-        scenes=[BagScene(bag) for bag in bags.values()], views=_answered_views)
+    known = folder.models if folder else load_model_folder(model).models if model else None
+    if not bags or known is None:
+        raise HoocError(f'{args.results} names neither a scene set nor bags that still exist; '
+                        'name the set with --set')
+    return _Source(results['dataset'], 'its bags', [BagScene(bag) for bag in bags.values()],
+                   {m.name: m for m in known}, _answered_views)
 
 
-def _answered_views(bag, entry):
-    """Return the DepthViews of the frame set that was answered, the bag's first if unknown."""
+def _answered_views(bag: 'BagScene', entry: dict[str, Any]) -> 'Sequence[DepthView]':
+    """Return the DepthViews of the frame set of the results, the bag's first if unknown."""
     images = entry.get('images')
     known = isinstance(images, dict) and all(
         isinstance(images.get(camera.name), int) for camera in bag.cameras)
     return bag.views(images if known else None)
 
 
-def _named(base, entry, key):
-    """Return the path that an entry names relative to `base`, None where nothing is there."""
+def _named(base: Path, entry: dict[str, Any], key: str) -> Path | None:
+    """Return the path that an entry names relative to `base`, None where it does not exist."""
     path = entry.get(key)
     if not isinstance(path, str) or '\0' in path or not (base / path).exists():
         return None

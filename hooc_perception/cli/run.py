@@ -2,43 +2,47 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc run`: replayed bags through the five nodes."""
 
+from argparse import ArgumentParser, Namespace
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 import sys
+from typing import Any, TYPE_CHECKING
 
-from hooc_perception.chain import CHAIN, INGESTION, PARSING, PROFILES, REPLAY, STAGES_OF
+from hooc_perception.chain import CHAIN, INGESTION, PARSING, REPLAY, STAGES_OF
+from hooc_perception.cli import options
 from hooc_perception.errors import HoocError
 
-# Where the ranges of the nodes' parameters `seed` and `wait_for_answer_s` end.
+if TYPE_CHECKING:
+    from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.supervisor.bags import Answer, BagRunner
+    from hooc_perception.trained.folder import ModelFolder
+
+# Upper limits of the node parameters `seed` and `wait_for_answer_s`.
 LAST_SEED, LONGEST_WAIT_S = 2 ** 31 - 1, 600.0
-HELP = ('Parse recorded bags through the five nodes as separate processes, fed by the replay '
-        'node. The same objects as `hooc parse` finds, with the time that the nodes took.')
+HELP = ('Find the objects of recorded bags through the five nodes, which run as separate '
+        'processes fed by the replay node. Finds the same objects as `hooc parse` and measures '
+        'the time the nodes take.')
 
 
-def add_arguments(parser):
+def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of `hooc run`."""
     parser.add_argument('bags', nargs='+', type=Path, metavar='BAG',
-                        help='rosbag2 folder, .mcap or .db3 file; a folder of bags stands for '
-                             'all of them')
-    parser.add_argument('--model', type=Path, required=True, metavar='MODEL',
-                        help='model folder that hooc train wrote')
-    parser.add_argument('--out', type=Path, required=True, metavar='RESULTS.json')
-    parser.add_argument('--profile', choices=PROFILES,
-                        help='default: the one the model was trained for')
-    parser.add_argument('--seed', type=int, help="default: the model's")
-    parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
-                        help='change one parameter of the profile; may be repeated')
+                        help='rosbag2 folder, .mcap or .db3 file, or a folder of bags')
+    parser.add_argument('--out', type=Path, required=True, metavar='RESULTS.json',
+                        help='results file to write')
+    options.add_chain(parser)
     parser.add_argument('--report', type=Path, metavar='DIR',
                         help='write a report with pictures to DIR/report.html')
     parser.add_argument('--record', type=Path, metavar='DIR',
-                        help='record all that goes over the topics as bags DIR/<scene>')
+                        help='record all topics as bags DIR/<scene>')
     parser.add_argument('--timeout', type=float, default=300.0, metavar='S',
-                        help='how long one scene may take (default: %(default)g s)')
+                        help='time limit per scene, seconds (default: %(default)g)')
     parser.add_argument('--params', type=Path, metavar='FILE',
-                        help='YAML of node parameters, as config/perception.yaml')
-    parser.add_argument('--verbose', action='store_true', help='show all that the nodes log')
+                        help='YAML file of node parameters, such as config/perception.yaml')
+    parser.add_argument('--verbose', action='store_true', help='show everything the nodes log')
 
 
-def run(args):
+def run(args: Namespace) -> int:
     """Run the command; return the exit code."""
     from hooc_perception.cli.categories import warn_of_gap
     from hooc_perception.cli.failures import tell_failures
@@ -47,7 +51,7 @@ def run(args):
     from hooc_perception.io.scenes.results import scene_result, write_results
     from hooc_perception.trained.folder import load_model_folder
     if not args.timeout > 0:
-        raise HoocError(f'--timeout is {args.timeout:g}; give the seconds that a scene may take')
+        raise HoocError(f'--timeout is {args.timeout:g}; give a positive number of seconds')
     check_places(args)
     model = load_model_folder(args.model)
     bags = [BagScene(path) for path in bag_paths(args.bags)]
@@ -69,11 +73,12 @@ def run(args):
         print(f'{args.out}: {found} objects in {len(entries)} '
               f'scene{"s" if len(entries) != 1 else ""}')
         if args.report:
-            write_report(args.report, done, answers, entries, model, profile, seed)
+            write_report(args, done, answers, entries, model,
+                         f'Profile {profile}, seed {seed}, through the nodes')
     return tell_failures(failures)
 
 
-def check_places(args):
+def check_places(args: Namespace) -> None:
     """Raise HoocError where --out, --report or --record cannot be written."""
     from hooc_perception.cli.places import file_place, folder_place, page_place
     file_place(args.out, '--out')
@@ -81,8 +86,8 @@ def check_places(args):
     folder_place(args.record, '--record')
 
 
-def check_bags(bags, record):
-    """Raise HoocError where bags cannot be used: better before anything starts."""
+def check_bags(bags: 'Sequence[BagScene]', record: Path | None) -> None:
+    """Raise HoocError where bags cannot be used, before anything starts."""
     names = [bag.name for bag in bags]
     for bag in bags:
         if names.count(bag.name) > 1:
@@ -95,22 +100,22 @@ def check_bags(bags, record):
         bag.views()
 
 
-def bag_paths(given):
-    """Return the bags that are given, folders of bags opened up; HoocError for none."""
-    paths = []
+def bag_paths(given: Iterable[Path]) -> list[Path]:
+    """Return the given bags, a folder of bags replaced by what it holds."""
+    paths: list[Path] = []
     for path in given:
         inside = sorted(p.parent for p in path.glob('*/metadata.yaml')) if path.is_dir() else []
         paths += [path] if (path / 'metadata.yaml').is_file() or not inside else inside
     return paths
 
 
-def chain_parameters(args, model):
+def chain_parameters(args: Namespace, model: 'ModelFolder') -> dict[str, dict[str, Any]]:
     """
-    Return {node: parameters} of the chain for what was given of profile, seed, --set-parameter.
+    Return {node: parameters} of the chain from --profile, --seed and --set-parameter.
 
-    What was not given is up to the user's file and then to the model: see `model_defaults`.
+    What was not given is left to the user's file and then to the model: see `model_defaults`.
 
-    :raises HoocError: where a parameter is unknown, or its value is refused.
+    :raises HoocError: where a parameter is unknown, or its value is rejected.
     """
     from hooc_perception.cli.overrides import overrides_of
     from hooc_perception.core import profiles
@@ -118,38 +123,40 @@ def chain_parameters(args, model):
     if not 0 <= seed <= LAST_SEED:
         raise HoocError(f'the seed is {seed}; give --seed a number from 0 to {LAST_SEED}')
     common = {'model': str(args.model.resolve()), 'profile': args.profile, 'seed': args.seed}
-    parameters = {name: {key: value for key, value in common.items() if value is not None}
-                  for name in CHAIN}
+    parameters: dict[str, dict[str, Any]] = {
+        name: {key: value for key, value in common.items() if value is not None}
+        for name in CHAIN}
     overrides = overrides_of(getattr(args, 'set_parameter', ()))
     changed = profiles.with_overrides(profiles.profile(args.profile or model.profile), overrides)
     for key in overrides:
         stage, _, name = key.partition('.')
         for node in (n for n in CHAIN if stage in STAGES_OF[n]):
-            # As the Config has it: 2 for a float became 2.0, which ROS insists on.
+            # As the Config holds it: 2 for a float has become 2.0, which ROS requires.
             parameters[node][key] = getattr(getattr(changed, stage), name)
     return parameters
 
 
-def model_defaults(model):
-    """Return {node: parameters} of the chain that hold where nobody says otherwise."""
+def model_defaults(model: 'ModelFolder') -> dict[str, dict[str, Any]]:
+    """Return {node: parameters} of the chain that apply unless something else is given."""
     return {name: {'profile': model.profile, 'seed': model.seed} for name in CHAIN}
 
 
-def play(bags, args, model):
+def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
+         ) -> 'tuple[dict[str, Answer], dict[str, HoocError], str, int]':
     """
     Play all bags through the nodes.
 
     :return: ({scene: Answer}, {scene: HoocError}, profile, seed); the last two as the nodes
-        have them.
+        report them.
     """
     from hooc_perception.supervisor.bags import BagRunner, MATCH_TIMEOUT_S
     from hooc_perception.supervisor.supervisor import Supervisor
     from tqdm import tqdm
     parameters = chain_parameters(args, model)
-    # A recorded frame set is complete however long it waits.
+    # A recorded frame set is complete, however long it waits.
     parameters[INGESTION].update(max_frame_age_s=0.0,
-                                        wait_for_answer_s=min(args.timeout, LONGEST_WAIT_S))
-    # Each bag is a scene of its own, whatever stood there in the last one.
+                                 wait_for_answer_s=min(args.timeout, LONGEST_WAIT_S))
+    # Each bag is a scene of its own: nothing is tracked from the last one.
     parameters[PARSING].update(track_ttl_s=0.0)
     parameters[REPLAY] = {'match_timeout_s': MATCH_TIMEOUT_S}
     with Supervisor((*CHAIN, REPLAY), parameters, isolated=True, verbose=args.verbose,
@@ -160,12 +167,16 @@ def play(bags, args, model):
     return *done, used['profile'], used['seed']
 
 
-def play_all(runner, bags):
-    """Return ({scene: Answer}, {scene: HoocError}); a scene that fails ends with itself."""
-    answers, failures, over = {}, {}, None
+def play_all(runner: 'BagRunner', bags: 'Iterable[BagScene]',
+             ) -> 'tuple[dict[str, Answer], dict[str, HoocError]]':
+    """Return ({scene: Answer}, {scene: HoocError}); after a failure the next scene follows."""
+    answers: dict[str, Answer] = {}
+    failures: dict[str, HoocError] = {}
+    over = None
     for bag in bags:
         if over:
-            failures[bag.name] = HoocError(f'it was not played, for the nodes had failed ({over})')
+            failures[bag.name] = HoocError('it was not played because the nodes had failed '
+                                           f'({over})')
             continue
         try:
             answers[bag.name] = runner.play(bag)
@@ -178,7 +189,8 @@ def play_all(runner, bags):
     return answers, failures
 
 
-def write_report(folder, bags, answers, entries, model, profile, seed):
+def write_report(args: Namespace, bags: 'Sequence[BagScene]', answers: 'Mapping[str, Answer]',
+                 entries: Sequence[dict[str, Any]], model: 'ModelFolder', note: str) -> None:
     """Write DIR/report.html from what the nodes have published."""
     from hooc_perception.evaluation.report.page import write_report as write_page
     from hooc_perception.evaluation.report.scene import report_scene
@@ -187,6 +199,5 @@ def write_report(folder, bags, answers, entries, model, profile, seed):
                            probabilities=answer.probabilities, pool=answer.parsed.pool)
               for entry, bag, answer in (
                   (entry, bag, answers[bag.name]) for entry, bag in zip(entries, bags))]
-    path = write_page(folder, scenes, f'What stands on the table: {bags[0].info["dataset"]}',
-                      [f'Profile {profile}, seed {seed}, through the nodes'])
-    print(path)
+    print(write_page(args.report, scenes, f'Objects on the table: {bags[0].info["dataset"]}',
+                     [note]))

@@ -2,31 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc train`: a MODEL folder from a set's generic meshes and cameras."""
 
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 import time
 
-from hooc_perception.chain import PROFILES
-from hooc_perception.cli import executor_option
+from hooc_perception.cli import options
 
 HELP = ('Train a model from the generic meshes and the cameras of a scene set. Its scenes are '
-        'never read. Profile paper learns for exactly this rig; best and fast serve any.')
+        'never read. Profile paper trains for exactly this rig; best and fast work with any.')
 
 
-def add_arguments(parser):
+def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of `hooc train`."""
     parser.add_argument('set', type=Path, metavar='SET', help='folder of a scene set')
     parser.add_argument('--out', type=Path, required=True, metavar='MODEL',
-                        help='model folder to write; an older one is replaced')
-    parser.add_argument('--profile', choices=PROFILES, default='best')
+                        help='model folder to write; an existing one is replaced')
+    options.add_profile(parser, 'best')
     parser.add_argument('--seed', type=int, default=0,
-                        help='same seed, same model (default: %(default)s)')
+                        help='the same seed gives the same model (default: %(default)s)')
     parser.add_argument('--jobs', type=int, default=0, metavar='N',
                         help='parallel workers, 0 = all cores; does not change the model')
-    executor_option.add_argument(parser)
+    options.add_executor(parser)
 
 
-def run(args):
-    """Train and say where the model is."""
+def run(args: Namespace) -> None:
+    """Train and print where the model is."""
     from hooc_perception.cli.places import folder_place
     from hooc_perception.errors import HoocError
     from hooc_perception.executor import executor

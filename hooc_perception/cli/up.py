@@ -2,34 +2,30 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc up`: the nodes alone, for live cameras."""
 
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from hooc_perception.chain import CHAIN, INGESTION, PROFILES
+from hooc_perception.chain import CHAIN, INGESTION
+from hooc_perception.cli import options
 
-HELP = ('Start the four nodes of the chain for live cameras and keep them up until '
+HELP = ('Start the four nodes of the chain for live cameras and keep them running until '
         'interrupted. Cameras publish <camera>/depth/image_raw and camera_info under /hooc; '
-        'answers come on /hooc/objects/poses and /hooc/objects/attributes.')
+        'results appear on /hooc/objects/poses and /hooc/objects/attributes.')
 
 
-def add_arguments(parser):
+def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of `hooc up`."""
-    parser.add_argument('--model', type=Path, required=True, metavar='MODEL',
-                        help='model folder that hooc train wrote')
     parser.add_argument('--cameras', type=Path, metavar='cameras.yaml',
                         help='names and poses of the cameras; without it, names come from the '
                              'model and poses from <camera>/extrinsics or /tf_static')
-    parser.add_argument('--profile', choices=PROFILES,
-                        help='default: the one the model was trained for')
-    parser.add_argument('--seed', type=int, help="default: the model's")
-    parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
-                        help='change one parameter of the profile; may be repeated')
+    options.add_chain(parser)
     parser.add_argument('--namespace', default='/hooc', help='default: %(default)s')
     parser.add_argument('--params', type=Path, metavar='FILE',
-                        help='YAML of node parameters, as config/perception.yaml')
+                        help='YAML file of node parameters, such as config/perception.yaml')
     parser.add_argument('--quiet', action='store_true', help='show only warnings and errors')
 
 
-def run(args):
+def run(args: Namespace) -> None:
     """Run the command until it is interrupted."""
     from hooc_perception.cli.run import chain_parameters, model_defaults
     from hooc_perception.supervisor.supervisor import Supervisor
@@ -52,16 +48,16 @@ def run(args):
             supervisor.bring_up()
             up = True
             topic = supervisor.node.resolve_topic_name('objects/poses')
-            print(f'the nodes are up; objects come on {topic}; end with Ctrl-C', flush=True)
+            print(f'the nodes are up; results appear on {topic}; stop with Ctrl-C', flush=True)
             while True:
                 watchdog.spin(0.2)
     except KeyboardInterrupt:
-        # The way to end this command; an interrupt before it was up is one.
+        # The normal end of this command, unless the nodes were not up yet.
         if not up:
             raise
 
 
-def camera_poses(path):
+def camera_poses(path: str | Path) -> dict[str, list[float]]:
     """Return {camera: [x, y, z, qx, qy, qz, qw]} of a cameras.yaml."""
     from hooc_perception.core.geometry import pose_from_matrix
     from hooc_perception.io.scenes.camera_files import load_cameras

@@ -1,19 +1,25 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every score as plain data, for --json."""
+"""Scores and stage losses as plain data, for --json."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 import math
+from typing import Any
 
+from hooc_perception.core.types import Energy
 from hooc_perception.evaluation import paper
+from hooc_perception.evaluation.evaluate import Evaluation
 from hooc_perception.evaluation.paper_tables import TERMS
 from hooc_perception.evaluation.scores import means
+from hooc_perception.evaluation.visibility import Visibility
+from hooc_perception.io.scenes.scene_set import SceneSet
 import numpy as np
 
 
-def plain(value):
+def plain(value: Any) -> Any:
     """Return a value as JSON knows it: NaN and infinity become null, arrays become lists."""
-    if is_dataclass(value):
+    if is_dataclass(value) and not isinstance(value, type):
         value = asdict(value)
     if isinstance(value, dict):
         return {str(k): plain(v) for k, v in value.items()}
@@ -28,11 +34,13 @@ def plain(value):
     return value
 
 
-def as_json(scene_set, evaluations, visibility, truth_energy, stages):
-    """Return the content of the JSON file: results, visibility, energies, stages, paper."""
+def as_json(scene_set: SceneSet, evaluations: Sequence[Evaluation],
+            visibility: Mapping[str, Sequence[Visibility]],
+            truth_energy: Mapping[str, Energy]) -> dict[str, Any]:
+    """Return the content of the scores file: results, visibility, energies, the paper."""
     results = []
     for e in evaluations:
-        entry = {'label': e.label, 'setting': e.setting, 'energy': e.energy}
+        entry: dict[str, Any] = {'label': e.label, 'setting': e.setting, 'energy': e.energy}
         if e.scores:
             entry |= {'mean': means(e.scores), 'scenes': [asdict(s) for s in e.scores],
                       'categories': e.per_category(scene_set.category_names)}
@@ -46,4 +54,9 @@ def as_json(scene_set, evaluations, visibility, truth_energy, stages):
         'visibility': {name: [asdict(v) for v in rows] for name, rows in visibility.items()},
         'truth_energy': {name: {t: getattr(energy, t) for t in TERMS}
                          for name, energy in truth_energy.items()},
-        'stages': stages, 'paper': {'scores': paper.SCORES, 'energy': paper.ENERGY}})
+        'paper': {'scores': paper.SCORES, 'energy': paper.ENERGY}})
+
+
+def stages_as_json(scene_set: SceneSet, losses: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content of the stages file, from what `rerun` says that the stages lose."""
+    return plain({'format': 'hooc-stages/1', 'dataset': scene_set.name, 'stages': losses})

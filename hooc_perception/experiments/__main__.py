@@ -1,8 +1,9 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""`make results`: compute what is out of date, then write the tables into the pages."""
+"""`make results`: recompute what is out of date, then write the tables into the docs."""
 
 import argparse
+from collections.abc import Sequence
 from pathlib import Path
 import sys
 
@@ -13,25 +14,26 @@ from hooc_perception.experiments.run import run
 DOCS = fingerprint.PACKAGE.parent / 'docs'
 
 
-def main(argv=None):
+def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; return the exit code."""
     parser = argparse.ArgumentParser(prog='python -m hooc_perception.experiments',
                                      description=__doc__)
     parser.add_argument('--out', type=Path, default=Path('results'),
-                        help='folder of everything computed (default: results)')
+                        help='folder of all computed files (default: results)')
     parser.add_argument('--set', action='append', default=[], metavar='NAME[=FOLDER]',
-                        help='a set to run; twin needs no folder (default: twin)')
+                        help='a set to evaluate; twin needs no folder (default: twin)')
     parser.add_argument('--rows', nargs='+', default=list(plan.ROWS), metavar='ROW',
-                        help=f'only these of {", ".join(plan.ROWS)}')
+                        help=f'only these rows of {", ".join(plan.ROWS)}')
     parser.add_argument('--keep', nargs='+', default=[], metavar='ROW',
-                        help='rows that stay though their code has changed')
+                        help='rows that are kept even though their code has changed')
     parser.add_argument('--force', nargs='+', default=[], metavar='ROW',
-                        help='rows that run in any case')
+                        help='rows that are always recomputed')
     parser.add_argument('--seed', type=int, default=0)
-    parser.add_argument('--jobs', type=int, default=0, help='workers of training, 0 = all cores')
+    parser.add_argument('--jobs', type=int, default=0,
+                        help='parallel workers of the training, 0 = all cores')
     parser.add_argument('--docs', type=Path, default=DOCS,
-                        help='folder whose pages take the tables')
-    parser.add_argument('--dry-run', action='store_true', help='only say what would run and why')
+                        help='folder of the pages that receive the tables')
+    parser.add_argument('--dry-run', action='store_true', help='only print what would run and why')
     args = parser.parse_args(argv)
     try:
         sets = dict(s.partition('=')[::2] for s in args.set or ['twin'])

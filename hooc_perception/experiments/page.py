@@ -1,23 +1,27 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Put the tables into the pages of the documentation, between markers.
+Write the tables into the pages of the documentation, between markers.
 
 `<!-- results: NAME -->` and `<!-- end of results -->` enclose what is written here; everything
-else on a page is prose. A set that was not run leaves its tables as they are.
+else on a page is prose. The tables of a set that was not run stay as they are.
 """
 
+from collections.abc import Iterable, Mapping, Sequence
 import json
 from pathlib import Path
 import re
 import shutil
+from typing import Any
 
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.tables import to_markdown
 from hooc_perception.evaluation.worst import worst_table
 from hooc_perception.experiments import ablations
-from hooc_perception.experiments import experiment_tables as tables
-from hooc_perception.experiments.plan import Layout, SCORED
+from hooc_perception.experiments.detail_tables import details_of
+from hooc_perception.experiments.experiment_tables import step_table, summary_of
+from hooc_perception.experiments.plan import Layout, PROFILES, SCORED
+from hooc_perception.experiments.records import Record
 from hooc_perception.io.scenes.files import write_atomically
 
 END = '<!-- end of results -->'
@@ -25,7 +29,8 @@ SECTION = re.compile(r'(<!-- results: ([\w ]+) -->\n).*?(' + re.escape(END) + ')
 PICTURES = ('errors', 'categories', 'certainty')
 
 
-def sections_of(root, sets, records):
+def sections_of(root: str | Path, sets: Iterable[str],
+                records: Mapping[str, Record]) -> dict[str, str]:
     """
     Return {marker name: Markdown} of everything that has been computed.
 
@@ -35,12 +40,15 @@ def sections_of(root, sets, records):
     out = {}
     for name in sets:
         layout = Layout(Path(root), name)
-        scores = _scores(layout, SCORED)
+        scores = _contents({row: layout.scores(row) for row in SCORED})
         if scores:
-            summary, details = tables.of_set(name, scores, records)
-            out[name] = '\n'.join(map(to_markdown, summary))
-            out[f'{name} details'] = '\n'.join(map(to_markdown, details))
-        less = _scores(layout, [switch.row for switch in ablations.SWITCHES])
+            posed, masked = ({row: s for row, s in scores.items() if key in s['results'][0]}
+                             for key in ('mean', 'masks'))
+            stages = _contents({row: layout.stages(row) for row in PROFILES if row in posed})
+            out[name] = '\n'.join(map(to_markdown, summary_of(
+                name, posed, masked, {row: s['stages'] for row, s in stages.items()}, records)))
+            out[f'{name} details'] = '\n'.join(map(to_markdown, details_of(posed, masked)))
+        less = _contents({s.row: layout.scores(s.row) for s in ablations.SWITCHES})
         if less:
             out[f'{name} {ablations.ROW}'] = '\n'.join(map(to_markdown, ablations.tables_of(
                 name, scores.get('best'), less, records)))
@@ -48,34 +56,35 @@ def sections_of(root, sets, records):
         if worst.exists():
             out[f'{name} worst'] = to_markdown(worst_table(json.loads(worst.read_text())))
     if records:
-        out['steps'] = to_markdown(tables.step_table(records))
+        out['steps'] = to_markdown(step_table(records))
     return out
 
 
-def _scores(layout, rows):
-    """Return {row: content of its scores file} of the rows that have one."""
-    return {row: json.loads(layout.scores(row).read_text())
-            for row in rows if layout.scores(row).exists()}
+def _contents(files: Mapping[str, Path]) -> dict[str, Any]:
+    """Return {row: content of its JSON file} of the rows whose file exists."""
+    return {row: json.loads(path.read_text()) for row, path in files.items() if path.exists()}
 
 
-def inserted(text, sections, where='the page'):
+def inserted(text: str, sections: Mapping[str, str],
+             where: str = 'the page') -> tuple[str, set[str]]:
     """
     Return a page's text with its sections replaced, and the set of the names that it has.
 
-    :raises HoocError: a section without an end.
+    :raises HoocError: where a section has no end.
     """
     if text.count('<!-- results: ') != len(SECTION.findall(text)):
-        raise HoocError(f'{where} has a marker <!-- results: ... --> without {END}; add that')
+        raise HoocError(f'{where} has a marker <!-- results: ... --> without {END}; add it')
     names = {name for _, name, _ in SECTION.findall(text)}
 
-    def put(match):
+    def put(match: re.Match[str]) -> str:
         head, name, end = match.groups()
         return f'{head}\n{sections[name].strip()}\n\n{end}' if name in sections else match[0]
 
     return SECTION.sub(put, text), names
 
 
-def write_pages(pages, images, root, sets, records):
+def write_pages(pages: Sequence[Path], images: str | Path, root: str | Path,
+                sets: Iterable[str], records: Mapping[str, Record]) -> list[Path]:
     """
     Write the sections into pages and copy pictures beside them.
 
@@ -83,7 +92,8 @@ def write_pages(pages, images, root, sets, records):
     :param images: folder of pictures; results_SET_NAME.png of sets that the pages name.
     :return: [Path] of what was written.
     """
-    sections, written, named = sections_of(root, sets, records), [], set()
+    sections, written = sections_of(root, sets, records), []
+    named: set[str] = set()
     for page in pages:
         text, names = inserted(page.read_text(), sections, str(page))
         named |= names

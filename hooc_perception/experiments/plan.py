@@ -8,6 +8,7 @@ own chain of steps, so that one can be computed again without the others. The ro
 a table of its own: the profile `best`, with its model, less one part at a time.
 """
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +24,7 @@ ROWS = SCORED + (ABLATIONS,)
 
 # Modules whose code, with all that they import, a kind of step runs.
 _SETS = 'hooc_perception.io.scenes.scene_set'
+_SCORES = ('hooc_perception.evaluation.as_json', 'hooc_perception.evaluation.evaluate', _SETS)
 CODE = {
     'twin': ('hooc_perception.synthesis.twin',),
     'train': ('hooc_perception.training.train', _SETS),
@@ -30,10 +32,9 @@ CODE = {
               'hooc_perception.evaluation.true_poses', 'hooc_perception.trained.folder',
               'hooc_perception.io.scenes.results', _SETS),
     'baseline': ('hooc_perception.evaluation.baselines', _SETS),
-    'scores': ('hooc_perception.evaluation.as_json', 'hooc_perception.evaluation.evaluate',
-               _SETS),
-    'stages': ('hooc_perception.evaluation.as_json', 'hooc_perception.evaluation.evaluate',
-               'hooc_perception.evaluation.rerun', _SETS),
+    'scores': _SCORES,
+    'scores with energy': ('hooc_perception.evaluation.rerun', *_SCORES),
+    'stages': ('hooc_perception.evaluation.as_json', 'hooc_perception.evaluation.rerun', _SETS),
     'plots': ('hooc_perception.evaluation.evaluate', 'hooc_perception.evaluation.plots', _SETS),
     'worst': ('hooc_perception.evaluation.evaluate', 'hooc_perception.evaluation.worst_sheet',
               _SETS),
@@ -57,8 +58,8 @@ class Step:
     name: str
     row: str
     kind: str
-    arguments: tuple
-    inputs: tuple
+    arguments: tuple[str | Path, ...]
+    inputs: tuple[Path, ...]
     output: Path
 
 
@@ -69,123 +70,160 @@ class Layout:
     root: Path
     name: str
 
-    def model(self, row):
+    def model(self, row: str) -> Path:
         """Return the model folder of a profile."""
         return self.root / self.name / 'models' / row
 
-    def results(self, row, setting):
+    def results(self, row: str, setting: str) -> Path:
         """Return the results file of a row in setting 'A' or 'B'."""
         return self.root / self.name / setting / f'{row}.json'
 
-    def scores(self, row):
+    def scores(self, row: str) -> Path:
         """Return the scores of a row, as `hooc evaluate --json` writes them."""
         return self.root / self.name / 'scores' / f'{row}.json'
 
+    def stages(self, row: str) -> Path:
+        """Return what the stages of a profile lose, as `hooc stages --json` writes it."""
+        return self.root / self.name / 'stages' / f'{row}.json'
+
     @property
-    def plots(self):
+    def plots(self) -> Path:
         """Return the folder of pictures."""
         return self.root / self.name / 'plots'
 
     @property
-    def worst(self):
+    def worst(self) -> Path:
         """Return the folder of the picture and the list of the worst scenes of `best`."""
         return self.root / self.name / 'worst'
 
     @property
-    def twin(self):
+    def twin(self) -> Path:
         """Return the folder of the set itself, where it is ours to write."""
         return self.root / self.name / 'set'
 
 
-def steps_of(sets, root, rows=ROWS, seed=0, jobs=0):
+@dataclass(frozen=True)
+class _SetPlan:
+    """
+    What the steps of one set have in common.
+
+    :ivar path: folder of the set; `posed` says whether some of its scenes have true poses.
+    """
+
+    layout: Layout
+    path: Path
+    posed: bool
+    seed: str
+    jobs: str
+
+    def row(self, row: str) -> list[Step]:
+        """Return the steps of one row."""
+        if row == ABLATIONS:
+            return self._ablations()
+        return self._baseline(row) if row in BASELINES else self._profile(row)
+
+    def _step(self, row: str, what: str, kind: str, arguments: Iterable[str | Path],
+              inputs: Iterable[Path], output: Path) -> Step:
+        """Return a Step whose command ends with the place of its output."""
+        option = '--json' if kind.startswith(('scores', 'stages')) else '--out'
+        return Step(f'{self.layout.name}/{row}/{what}', row.partition('/')[0], kind,
+                    (*arguments, option, output), (self.path, *inputs), output)
+
+    def _scores(self, row: str, answers: Sequence[Path], model: Path | None = None) -> Step:
+        """Return the step that scores the answers of a row."""
+        more: list[str | Path] = ['--bop'] if self.posed and '/' not in row else []
+        if model:
+            more += ['--model', model]
+        return self._step(row, 'scores', 'scores with energy' if model else 'scores',
+                          ['evaluate', self.path, *answers, *more],
+                          [*answers, *([model] if model else [])], self.layout.scores(row))
+
+    def _baseline(self, row: str) -> list[Step]:
+        """Return the steps of a baseline."""
+        answer = self.layout.results(row, 'A')
+        return [self._step(row, 'A', 'baseline', ['baseline', self.path, '--method', row,
+                                                  '--seed', self.seed], [], answer),
+                self._scores(row, [answer])]
+
+    def _profile(self, row: str) -> list[Step]:
+        """Return the steps of a profile: training, settings A and B, scores, stages."""
+        path, model, answers = self.path, self.layout.model(row), [self.layout.results(row, 'A')]
+        out = [self._step(row, 'train', 'train',
+                          ['train', path, '--profile', row, '--seed', self.seed, '--jobs',
+                           self.jobs], [], model)]
+        parse = ['parse', path, '--model', model, '--profile', row, '--seed', self.seed]
+        out.append(self._step(row, 'A', 'parse', parse, [model], answers[0]))
+        if not self.posed:
+            return [*out, self._scores(row, answers)]
+        answers.append(self.layout.results(row, 'B'))
+        out.append(self._step(row, 'B', 'parse', [*parse, '--true-poses'], [model], answers[1]))
+        return [*out, self._scores(row, answers, model),
+                self._step(row, 'stages', 'stages', ['stages', path, '--model', model], [model],
+                           self.layout.stages(row))]
+
+    def _ablations(self) -> list[Step]:
+        """Return the steps of the row `ablations`: two for every switch."""
+        out, model = [], self.layout.model('best')
+        for switch in SWITCHES:
+            answer = self.layout.results(switch.row, 'A')
+            changed = [text for p in switch.parameters for text in ('--set-parameter', p)]
+            out += [self._step(switch.row, 'A', 'parse',
+                               ['parse', self.path, '--model', model, '--profile', 'best',
+                                '--seed', self.seed, *changed], [model], answer),
+                    self._scores(switch.row, [answer])]
+        return out
+
+    def pictures(self, wanted: Sequence[str]) -> list[Step]:
+        """Return the steps that draw the scores and the worst scenes of `best`."""
+        layout, path = self.layout, self.path
+        files = tuple(layout.results(row, 'A') for row in SCORED
+                      if row in wanted or layout.results(row, 'A').exists())
+        out = [Step(f'{layout.name}/plots', 'plots', 'plots',
+                    ('evaluate', path, *files, '--plots', layout.plots),
+                    (path, *files), layout.plots)]
+        files = (layout.results('best', 'A'), layout.stages('best'))
+        if 'best' in wanted or all(file.exists() for file in files):
+            out.append(Step(f'{layout.name}/worst', 'plots', 'worst',
+                            ('worst', path, files[0], '--count', str(WORST), '--stages', files[1],
+                             '--out', layout.worst), (path, *files), layout.worst))
+        return out
+
+
+def steps_of(sets: Mapping[str, str | Path | None], root: str | Path,
+             rows: Sequence[str] = ROWS, seed: int = 0, jobs: int = 0) -> list[Step]:
     """
     Return the [Step] of all experiments, in an order in which they can run.
 
     :param sets: {name: folder, or None for the twin, which is then written first}.
     :param root: folder of everything that is computed.
-    :raises HoocError: a row or a set that there is not.
+    :raises HoocError: where a row or a set does not exist.
     """
     for row in rows:
         if row not in ROWS:
             raise HoocError(f'there is no row {row!r}; choose among {", ".join(ROWS)}')
     out = []
-    for name, path in sets.items():
+    for name, folder in sets.items():
         layout = Layout(Path(root), name)
-        if path is None:
+        if folder is None:
             if name != 'twin':
                 raise HoocError(f'the set {name} needs a folder: {name}=FOLDER; only the twin '
                                 'is written here')
-            path = layout.twin
+            path, posed = layout.twin, True
             out.append(Step(f'{name}/set', 'set', 'twin',
                             ('twin', '--out', path, '--seed', str(seed)), (), path))
-            posed = True
         else:
-            path = Path(path)
+            path = Path(folder)
             posed = any(scene.truth for scene in load_scene_set(path).scenes)
+        plan = _SetPlan(layout, path, posed, str(seed), str(jobs))
         wanted = _with_best(layout, rows)
         for row in wanted:
-            out += (_ablations(layout, path, str(seed)) if row == ABLATIONS
-                    else _row(layout, path, row, posed, str(seed), str(jobs)))
+            out += plan.row(row)
         if posed:
-            files = tuple(layout.results(row, 'A') for row in SCORED
-                          if row in wanted or layout.results(row, 'A').exists())
-            out.append(Step(f'{name}/plots', 'plots', 'plots',
-                            ('evaluate', path, *files, '--plots', layout.plots),
-                            (path, *files), layout.plots))
-            files = (layout.results('best', 'A'), layout.scores('best'))
-            if 'best' in wanted or all(file.exists() for file in files):
-                out.append(Step(f'{name}/worst', 'plots', 'worst',
-                                ('evaluate', path, files[0], '--worst', str(WORST),
-                                 '--stages-from', files[1], '--plots', layout.worst),
-                                (path, *files), layout.worst))
+            out += plan.pictures(wanted)
     return out
 
 
-def _row(layout, path, row, posed, seed, jobs):
-    """Return the steps of one row of a set."""
-    def step(what, kind, arguments, inputs, output):
-        return Step(f'{layout.name}/{row}/{what}', row, kind, tuple(arguments), tuple(inputs),
-                    output)
-
-    score = ['--json', layout.scores(row), *(['--bop'] if posed else [])]
-    answer = layout.results(row, 'A')
-    if row in BASELINES:
-        return [step('A', 'baseline', ['evaluate', path, '--baseline', row, '--out', answer,
-                                       '--seed', seed], [path], answer),
-                step('scores', 'scores', ['evaluate', path, answer, *score], [path, answer],
-                     layout.scores(row))]
-    model, answers = layout.model(row), [answer]
-    out = [step('train', 'train', ['train', path, '--out', model, '--profile', row, '--seed',
-                                   seed, '--jobs', jobs], [path], model)]
-    parse = ['parse', path, '--model', model, '--profile', row, '--seed', seed]
-    out.append(step('A', 'parse', [*parse, '--out', answer], [path, model], answer))
-    if posed:
-        answers.append(layout.results(row, 'B'))
-        out.append(step('B', 'parse', [*parse, '--true-poses', '--out', answers[1]],
-                        [path, model], answers[1]))
-        score += ['--model', model, '--stages']
-    out.append(step('scores', 'stages' if posed else 'scores',
-                    ['evaluate', path, *answers, *score],
-                    [path, *answers, *([model] if posed else [])], layout.scores(row)))
-    return out
-
-
-def _with_best(layout, rows):
+def _with_best(layout: Layout, rows: Sequence[str]) -> list[str]:
     """Return the rows in the order of ROWS, with `best` where its ablations lack it."""
     needed = () if layout.model('best').exists() and layout.scores('best').exists() else ('best',)
     return [row for row in ROWS if row in rows or ABLATIONS in rows and row in needed]
-
-
-def _ablations(layout, path, seed):
-    """Return the steps of the row `ablations` of a set: two for every switch."""
-    out, model = [], layout.model('best')
-    for switch in SWITCHES:
-        answer, scores = layout.results(switch.row, 'A'), layout.scores(switch.row)
-        changed = [text for p in switch.parameters for text in ('--set-parameter', p)]
-        name = f'{layout.name}/{switch.row}'
-        out.append(Step(f'{name}/A', ABLATIONS, 'parse',
-                        ('parse', path, '--model', model, '--profile', 'best', '--seed', seed,
-                         *changed, '--out', answer), (path, model), answer))
-        out.append(Step(f'{name}/scores', ABLATIONS, 'scores',
-                        ('evaluate', path, answer, '--json', scores), (path, answer), scores))
-    return out

@@ -2,7 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run the steps that are out of date, one after another, and record what each took."""
 
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 import hashlib
 import json
 import os
@@ -13,43 +14,12 @@ import time
 
 from hooc_perception.errors import HoocError
 from hooc_perception.experiments import fingerprint
-from hooc_perception.experiments.plan import CODE
+from hooc_perception.experiments.plan import CODE, Step
+from hooc_perception.experiments.records import load_records, Record, RECORDS
 from hooc_perception.io.scenes.files import write_atomically
 
-RECORDS = 'steps.json'
 
-
-@dataclass(frozen=True)
-class Record:
-    """
-    How a step went.
-
-    :ivar key: fingerprint of its command and inputs; `code` of the code that ran.
-    :ivar commit: of the source tree then, + where files were changed.
-    :ivar cpu_s: processor seconds of the process and its children; `wall_s` seconds passed.
-    :ivar peak_mb: most memory of the process.
-    """
-
-    key: str
-    code: str
-    commit: str
-    cpu_s: float
-    wall_s: float
-    peak_mb: float
-
-
-def load_records(root):
-    """Return {step name: Record} of what was run before."""
-    path = Path(root) / RECORDS
-    if not path.exists():
-        return {}
-    try:
-        return {name: Record(**entry) for name, entry in json.loads(path.read_text()).items()}
-    except (ValueError, TypeError) as e:
-        raise HoocError(f'{path} is damaged ({e}); delete it to run every step again') from None
-
-
-def key_of(step):
+def key_of(step: Step) -> str:
     """Return the fingerprint of a step's command and of the contents of its inputs."""
     digest = hashlib.sha256()
     for before, argument in zip(('', *step.arguments), step.arguments):
@@ -62,18 +32,19 @@ def key_of(step):
     return digest.hexdigest()[:16]
 
 
-def reason_to_run(step, record, keep=(), force=()):
+def reason_to_run(step: Step, record: Record | None, keep: Sequence[str] = (),
+                  force: Sequence[str] = ()) -> str:
     """
-    Return why a step has to run, '' where it has not.
+    Return why a step has to run, '' where it need not.
 
     :param record: Record of the last time, None where there was none.
-    :param keep: rows that stay as they are though the code has changed.
+    :param keep: rows that stay as they are even though the code has changed.
     :param force: rows that run in any case.
     """
     if record is None or not step.output.exists():
         return 'not done yet'
     if step.row in force:
-        return 'asked for'
+        return 'forced'
     if record.key != key_of(step):
         return 'its inputs have changed'
     if record.code != fingerprint.of_code(CODE[step.kind]) and step.row not in keep:
@@ -81,17 +52,20 @@ def reason_to_run(step, record, keep=(), force=()):
     return ''
 
 
-def run(steps, root, keep=(), force=(), dry=False, say=print):
+def run(steps: Sequence[Step], root: str | Path, keep: Sequence[str] = (),
+        force: Sequence[str] = (), dry: bool = False,
+        say: Callable[[str], object] = print) -> dict[str, Record]:
     """
     Run what is out of date; return {step name: Record}.
 
     :param dry: only say what would run and why.
     :raises HoocError: where a step fails, with its log's path; the next call resumes there.
     """
-    root, start, done, pending = Path(root), time.monotonic(), 0, set()
+    root, start, done = Path(root), time.monotonic(), 0
+    pending: set[Path] = set()
     records = load_records(root)
     for number, step in enumerate(steps, 1):
-        why = ('follows another' if pending & set(step.inputs)
+        why = ('depends on another' if pending & set(step.inputs)
                else reason_to_run(step, records.get(step.name), keep, force))
         head = f'[{number}/{len(steps)}] {step.name}'
         if not why:
@@ -111,7 +85,7 @@ def run(steps, root, keep=(), force=(), dry=False, say=print):
     return records
 
 
-def execute(step, root):
+def execute(step: Step, root: Path) -> Record:
     """Run one step as a process of its own; return its Record."""
     key, code = key_of(step), fingerprint.of_code(CODE[step.kind])
     commit = fingerprint.commit()
@@ -121,11 +95,11 @@ def execute(step, root):
     command = [sys.executable, '-m', 'hooc_perception.cli.main', *map(str, step.arguments)]
     start = time.monotonic()
     with log.open('w') as file:
-        # On a terminal the step's own progress bars show.
+        # On a terminal the progress bars of the step are shown.
         process = subprocess.Popen(command, stdout=file, stdin=subprocess.DEVNULL,
                                    stderr=None if sys.stderr.isatty() else file)
         try:
-            # wait4 tells what this process and the workers that it waited for have used.
+            # wait4 reports the resources of this process and of the workers it waited for.
             _, status, used = os.wait4(process.pid, 0)
         except BaseException:
             process.terminate()
@@ -133,7 +107,7 @@ def execute(step, root):
             raise
         process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode or not step.output.exists():
-        raise HoocError(f'{step.name} failed; {log} says why. Mend that and run the same '
-                        'command again: what is done is kept')
+        raise HoocError(f'{step.name} failed; {log} says why; fix that and run the same command '
+                        'again, finished steps are kept')
     return Record(key, code, commit, round(used.ru_utime + used.ru_stime, 1),
                   round(time.monotonic() - start, 1), round(used.ru_maxrss / 1024, 0))

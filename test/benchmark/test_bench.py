@@ -7,7 +7,8 @@ import json
 from hooc_perception.benchmark import learning, parsing, rendering
 from hooc_perception.benchmark.measure import Contest, Contestant, hold
 from hooc_perception.benchmark.scene import bench_scene
-from hooc_perception.cli.main import main
+from hooc_perception.cli.bench import TOOLS
+from hooc_perception.cli.main import main, with_default_tool
 from hooc_perception.core.energy.eq1 import Eq1
 from hooc_perception.core.render import render_depth
 from hooc_perception.errors import HoocError
@@ -99,3 +100,29 @@ def test_the_command(tmp_path, capsys):
 def test_an_unknown_stage_is_named(capsys):
     assert main(['bench', '--stage', 'dance']) == 1
     assert 'render a view' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('words, command', [
+    (['--growth', '--plot', 'a.png'], 'hooc bench growth'), (['--fuzz', '9'], 'hooc bench fuzz'),
+    (['--plot', 'a.png', '--soak=3'], 'hooc bench soak')])
+def test_options_of_earlier_versions_name_the_new_command(capsys, words, command):
+    assert main(['bench', *words]) == 1
+    error, = capsys.readouterr().err.splitlines()
+    assert f'{words[0] if words[0] != "--plot" else "--soak"} has moved; use {command}' in error
+
+
+@pytest.mark.parametrize('words, completed', [
+    (['bench'], ['bench', 'speed']), (['bench', 'growth', '--seed', '1'],) * 2,
+    (['--debug', 'bench', '--json', 'growth'], ['--debug', 'bench', 'speed', '--json', 'growth']),
+    (['bench', '--debug', 'soak'],) * 2, (['bench', '--help'],) * 2, (['train', 'bench'],) * 2,
+    ([], [])])
+def test_bench_alone_measures_speed(words, completed):
+    assert with_default_tool(words) == completed
+
+
+@pytest.mark.parametrize('tool', list(TOOLS))
+def test_every_tool_explains_itself(tool, capsys):
+    with pytest.raises(SystemExit) as stop:
+        main(['bench', tool, '--help'])
+    assert stop.value.code == 0
+    assert f'usage: hooc bench {tool}' in capsys.readouterr().out

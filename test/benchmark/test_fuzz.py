@@ -33,14 +33,14 @@ def test_a_sample_of_all_kinds():
     assert result.failures == []
     assert sum(result.outcomes.values()) == 66
     outcomes = {outcome for _, outcome in result.outcomes}
-    assert outcomes == {fuzzer.READ, fuzzer.REFUSED}
+    assert outcomes == {fuzzer.READ, fuzzer.REJECTED}
 
 
 @pytest.mark.parametrize('kind, number, seed', MENDED)
 def test_what_failed_once_does_not_any_more(tmp_path, kind, number, seed):
     kinds = {kind: fuzzer.kinds_of_cases()[kind]}
     kind, outcome, text = fuzzer.run_case(number, seed, kinds, tmp_path)
-    assert outcome in (fuzzer.READ, fuzzer.REFUSED), (kind, text)
+    assert outcome in (fuzzer.READ, fuzzer.REJECTED), (kind, text)
 
 
 def test_the_fuzzer_sees_every_way_to_fail(tmp_path, monkeypatch):
@@ -48,7 +48,7 @@ def test_the_fuzzer_sees_every_way_to_fail(tmp_path, monkeypatch):
     monkeypatch.syspath_prepend(str(tmp_path))
     monkeypatch.setattr(fuzzer, 'HANG_S', 3.0)
     result = fuzzer.fuzz(7, source='foes:foes')
-    assert result.outcomes == {('a', 'refused'): 1, ('g', 'read'): 1}
+    assert result.outcomes == {('a', 'rejected'): 1, ('g', 'read'): 1}
     texts = {number: text for number, _, text in result.failures}
     assert 'no one sentence' in texts[1] and 'KeyError' in texts[2]
     assert 'died' in texts[3] and 'no end' in texts[4] and 'asked for' in texts[5]
@@ -67,8 +67,8 @@ def test_from_the_command_line(capsys, monkeypatch, tmp_path):
     monkeypatch.syspath_prepend(str(tmp_path))
     run = fuzzer.fuzz
     monkeypatch.setattr(fuzzer, 'fuzz', lambda *args: run(*args, source='foes:foes'))
-    assert main(['bench', '--fuzz', '1', '--seed', '5']) == 0
+    assert main(['bench', 'fuzz', '--cases', '1', '--seed', '5']) == 0
     assert '1 cases of seed 5; 0 failed' in capsys.readouterr().out
-    assert main(['bench', '--fuzz', '2']) == 1
+    assert main(['bench', 'fuzz', '--cases', '2']) == 1
     assert 'case 1 (b): no one sentence' in capsys.readouterr().out
-    assert main(['bench', '--fuzz', '0']) == 1
+    assert main(['bench', 'fuzz', '--cases', '0']) == 1

@@ -30,9 +30,9 @@ def test_table_tells_found_from_localized_and_from_invented():
     table = demo.comparison(entry, truth, MODELS)
     assert [row[:4] for row in table.rows] == [
         ('cup', 'yes', 'yes', '13'), ('ball', 'yes', 'no', '500'), ('tray', 'no', 'no', None),
-        ('ball', 'not there', None, None)]
+        ('ball', 'false positive', None, None)]
     text = to_text(table)
-    assert '2 of 3 found, 1 localized, 1 not there; 1.5 s' in text
+    assert '2 of 3 found, 1 localized, 1 false positives; 1.5 s' in text
 
 
 def test_without_a_bundle_the_mend_is_named(monkeypatch, tmp_path, capsys):
@@ -82,7 +82,7 @@ def test_demo(bundle, tmp_path, capsys):
     pytest.importorskip('rclpy')
     assert main(['demo', '--out', str(tmp_path)]) == 0
     text = capsys.readouterr().out
-    assert 'Objects found beside the truth' in text
+    assert 'Objects found beside the ground truth' in text
     assert ' of 10 found' in text
     page = (tmp_path / 'report.html').read_text()
     assert '<img' in page or '<svg' in page

@@ -215,7 +215,7 @@ def test_a_place_that_cannot_be_written_is_refused_before_the_work(
     assert hooc_parse(scene_set, model, tmp_path) == 1
     assert f'--out {tmp_path} is a folder; name a file' in sentence(capsys)
     assert hooc_parse(scene_set, model, tmp_path / 'file' / 'r.json') == 1
-    assert 'is no folder; choose another place' in sentence(capsys)
+    assert 'is not a folder; choose another place' in sentence(capsys)
 
 
 @pytest.fixture

@@ -25,9 +25,9 @@ def test_what_can_be_written_is_let_pass(tmp_path):
     (page_place, 'file', 'is a file; name a folder'),
     (page_place, 'page.html', 'is a folder; name a file'),
     (page_place, 'taken', 'is a folder; name a file'),
-    (file_place, 'file/x.json', 'is no folder; choose another place'),
-    (folder_place, 'file/a/b', 'is no folder; choose another place'),
-    (file_place, 'nowhere/x.json', 'is no folder; choose another place')])
+    (file_place, 'file/x.json', 'is not a folder; choose another place'),
+    (folder_place, 'file/a/b', 'is not a folder; choose another place'),
+    (file_place, 'nowhere/x.json', 'is not a folder; choose another place')])
 def test_what_cannot_is_refused(tmp_path, check, path, said):
     (tmp_path / 'folder').mkdir()
     (tmp_path / 'file').touch()
@@ -40,7 +40,7 @@ def test_what_cannot_is_refused(tmp_path, check, path, said):
 
 def test_a_folder_that_may_not_be_changed(tmp_path, monkeypatch):
     monkeypatch.setattr('os.access', lambda *_: False)
-    with pytest.raises(HoocError, match='may not be changed; choose another place'):
+    with pytest.raises(HoocError, match='is write-protected; choose another place'):
         file_place(tmp_path / 'x', '--out')
 
 
@@ -54,12 +54,15 @@ def test_a_place_is_named_from_the_file_on(tmp_path):
     ['run', 'bag', '--model', 'm', '--out', 'x.json', '--record', '{file}'],
     ['demo', '--out', '{file}'], ['twin', '--out', '{file}'],
     ['convert', 'set', '--out', '{file}'], ['train', 'set', '--out', '{file}'],
-    ['bench', '--json', '{folder}'], ['bench', '--plot', '{folder}'],
+    ['bench', '--json', '{folder}'], ['bench', 'growth', '--plot', '{folder}'],
+    ['bench', 'soak', '--json', '{folder}'],
     ['evaluate', 'set', 'r.json', '--json', '{folder}'],
     ['evaluate', 'set', 'r.json', '--markdown', '{folder}'],
-    ['evaluate', 'set', 'r.json', '--bop-csv', '{folder}'],
+    ['export', 'set', 'r.json', '--out', '{folder}'],
     ['evaluate', 'set', 'r.json', '--plots', '{file}'],
-    ['evaluate', 'set', '--baseline', 'ppf', '--out', '{folder}'],
+    ['baseline', 'set', '--method', 'ppf', '--out', '{folder}'],
+    ['stages', 'set', '--model', 'm', '--json', '{folder}'],
+    ['worst', 'set', 'r.json', '--out', '{file}'],
     ['report', 'r.json', '--out', '{file}']])
 def test_every_command_looks_first(tmp_path, words, capsys):
     (tmp_path / 'file').touch()

@@ -287,7 +287,7 @@ def test_a_damaged_bag_is_salvaged_and_checked_again(sound, tmp_path, capsys):
     out = tmp_path / 'saved'
     assert main(['doctor', str(folder), '--salvage', str(out)]) == 0
     printed = capsys.readouterr().out
-    assert 'messages saved' in printed and '0 errors' in printed
+    assert 'messages recovered' in printed and '0 errors' in printed
     assert len(list(iter_messages(out))) > 10
     assert main(['doctor', str(folder), str(sound), '--salvage', str(out)]) == 1
     storage.write_bytes(b'')

@@ -23,6 +23,6 @@ def test_baseline_finds_something_where_objects_stand_apart(tiny, models, tmp_pa
 
 def test_missing_module_is_named(tiny_path, tmp_path, capsys, monkeypatch):
     monkeypatch.delattr(cv2, 'ppf_match_3d_PPF3DDetector')
-    assert main(['evaluate', str(tiny_path), '--baseline', 'ppf', '--out',
+    assert main(['baseline', str(tiny_path), '--method', 'ppf', '--out',
                  str(tmp_path / 'b.json')]) == 1
     assert 'opencv-contrib-python-headless' in capsys.readouterr().err

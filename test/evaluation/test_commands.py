@@ -44,7 +44,8 @@ def test_evaluate_writes_json_markdown_plots_and_csv(tiny_path, truth_file, tmp_
     out = tmp_path / 'out'
     assert main(['evaluate', str(tiny_path), str(truth_file), '--bop', '--json',
                  str(out / 'a.json'), '--markdown', str(out / 'a.md'), '--plots',
-                 str(out / 'plots'), '--bop-csv', str(out / 'a.csv')]) == 0
+                 str(out / 'plots')]) == 0
+    assert main(['export', str(tiny_path), str(truth_file), '--out', str(out / 'a.csv')]) == 0
     scores = json.loads((out / 'a.json').read_text())
     assert scores['results'][0]['mean']['localized'] == 1
     assert scores['results'][0]['bop']['average'] == 1
@@ -63,9 +64,11 @@ def test_without_results_only_the_visibility_is_told(tiny_path, capsys):
 
 
 @pytest.mark.parametrize('arguments, word', [
-    (['--scene', 'elsewhere'], 'elsewhere'), (['--stages'], '--model'),
-    (['--model', 'no/such/folder'], 'no/such/folder'), (['--worst', '3'], '--plots'),
-    (['--worst', '-1', '--plots', 'p'], '--worst'), (['--stages-from', 'a.json'], '--worst')])
+    (['--scene', 'elsewhere'], 'elsewhere'), (['--model', 'no/such/folder'], 'no/such/folder'),
+    (['--stages'], 'hooc stages'), (['--worst', '3', '--plots', 'p'], 'hooc worst'),
+    (['--stages-from', 'a.json'], 'hooc worst'), (['--baseline', 'ppf'], 'hooc baseline'),
+    (['--bop-csv', 'a.csv'], 'hooc export'), (['--visibility'], 'without results'),
+    (['--seed=3'], 'seed 0'), (['--executor', 'local'], 'hooc stages')])
 def test_evaluate_says_what_is_wrong(tiny_path, truth_file, capsys, arguments, word):
     assert main(['evaluate', str(tiny_path), str(truth_file), *arguments]) == 1
     error = capsys.readouterr().err

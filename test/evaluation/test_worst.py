@@ -150,8 +150,8 @@ def test_the_command_writes_picture_and_reasons(tiny_path, truth_results, tmp_pa
     (tmp_path / 'r.json').write_text(json.dumps(truth_results))
     stages = {'10_1': {'pool': {'objects': [{'category': 'can', 'near': False}]}}}
     (tmp_path / 's.json').write_text(json.dumps({'stages': stages}))
-    assert main(['evaluate', str(tiny_path), str(tmp_path / 'r.json'), '--worst', '2', '--plots',
-                 str(tmp_path / 'p'), '--stages-from', str(tmp_path / 's.json')]) == 0
+    assert main(['worst', str(tiny_path), str(tmp_path / 'r.json'), '--count', '2', '--out',
+                 str(tmp_path / 'p'), '--stages', str(tmp_path / 's.json')]) == 0
     assert 'The worst scenes of `r`' in capsys.readouterr().out
     content = json.loads((tmp_path / 'p' / 'worst.json').read_text())
     first = content['scenes'][0]
@@ -162,6 +162,9 @@ def test_the_command_writes_picture_and_reasons(tiny_path, truth_results, tmp_pa
 
 def test_scenes_without_poses_have_no_worst(tiny_path, truth_results, tmp_path, capsys):
     (tmp_path / 'r.json').write_text(json.dumps(truth_results))
-    assert main(['evaluate', str(tiny_path), str(tmp_path / 'r.json'), '--scene', 'labelled',
-                 '--worst', '2', '--plots', str(tmp_path / 'p')]) == 1
+    assert main(['worst', str(tiny_path), str(tmp_path / 'r.json'), '--scene', 'labelled',
+                 '--count', '2', '--out', str(tmp_path / 'p')]) == 1
     assert 'true poses' in capsys.readouterr().err
+    assert main(['worst', str(tiny_path), str(tmp_path / 'r.json'), '--count', '0', '--out',
+                 str(tmp_path / 'p')]) == 1
+    assert '--count' in capsys.readouterr().err

@@ -4,6 +4,7 @@
 
 from pathlib import Path
 
+from hooc_perception.cli.main import main as hooc
 from hooc_perception.errors import HoocError
 from hooc_perception.experiments import fingerprint, page, plan, run
 from hooc_perception.experiments.__main__ import main
@@ -24,9 +25,9 @@ def test_the_plan_runs_in_its_order(tmp_path, scene_set):
         made.add(step.output)
     names = [step.name for step in steps]
     assert len(set(names)) == len(names)
-    # Two rows of baselines with two steps, three profiles with four, two steps a switch,
+    # Two rows of baselines with two steps, three profiles with five, two steps per switch,
     # two of pictures, and the twin.
-    assert len(names) == 2 * (2 * 2 + 3 * 4 + 2 * len(SWITCHES) + 2) + 1
+    assert len(names) == 2 * (2 * 2 + 3 * 5 + 2 * len(SWITCHES) + 2) + 1
 
 
 @pytest.mark.parametrize('sets, rows, word', [
@@ -67,7 +68,7 @@ def test_a_lost_file_is_made_again_and_only_what_depends_on_it(tmp_path, ran):
     ran.clear()
     (layout.model('best') / 'file').write_text('another model')
     quiet(steps, tmp_path)
-    assert ran == ['twin/best/A', 'twin/best/B', 'twin/best/scores']
+    assert ran == ['twin/best/A', 'twin/best/B', 'twin/best/scores', 'twin/best/stages']
 
 
 def test_changed_code_runs_its_rows_again_but_for_those_that_are_kept(tmp_path, ran,
@@ -184,14 +185,16 @@ def test_pages_take_tables_between_their_markers(computed, tmp_path):
     assert pages[0].read_text() == new
 
 
-def test_the_worst_scenes_come_onto_the_page_of_their_set(write_scores, tmp_path):
+def test_the_worst_scenes_come_onto_the_page_of_their_set(write_scores, scene_set, tmp_path):
     layout = plan.Layout(tmp_path / 'results', 'small')
-    write_scores('best', 0.07, 'A', '--plots', layout.worst, '--worst', '5')
+    root = write_scores('best', 0.07, 'A')
+    assert hooc(['worst', str(scene_set), str(layout.results('best', 'A')), '--out',
+                 str(layout.worst)]) == 0
     docs = tmp_path / 'docs'
     (docs / 'images').mkdir(parents=True)
     (docs / 'results.md').write_text('<!-- results: small worst -->\n<!-- end of results -->\n'
                                      '<!-- results: small -->\n<!-- end of results -->\n')
-    written = page.write_pages([docs / 'results.md'], docs / 'images', layout.root, ['small'], {})
+    written = page.write_pages([docs / 'results.md'], docs / 'images', root, ['small'], {})
     text = (docs / 'results.md').read_text()
     assert cells(text, 'one')[0][1:4] == ['0.50', 'can',
                                           'found 7 cm away; few pixels (120)']
@@ -207,7 +210,7 @@ def test_the_worst_scenes_are_those_of_best(tmp_path, ran, scene_set):
     quiet(plan.steps_of({'small': scene_set}, tmp_path, ('best',)), tmp_path)
     step, = worst('ppf')
     layout = plan.Layout(tmp_path, 'small')
-    assert {layout.results('best', 'A'), layout.scores('best')} < set(step.inputs)
+    assert {layout.results('best', 'A'), layout.stages('best')} < set(step.inputs)
     assert ran[-1] == 'small/worst'
 
 
@@ -231,4 +234,4 @@ def test_the_command_says_what_is_wrong(tmp_path, capsys):
     assert 'good' in capsys.readouterr().err
     assert main(['--out', str(tmp_path), '--dry-run']) == 0
     out = capsys.readouterr().out
-    assert 'twin/set: not done yet' in out and 'twin/ppf/scores: follows another' in out
+    assert 'twin/set: not done yet' in out and 'twin/ppf/scores: depends on another' in out

@@ -27,7 +27,7 @@ def palette_of(scenes):
         *s.models, *(o.category for o in (*s.objects, *(s.truth or ()))))}))
 
 
-def report_html(scenes, title='What stands on the table', notes=()):
+def report_html(scenes, title='Objects on the table', notes=()):
     """
     Return the page (str) of a sequence of ReportScene.
 
@@ -49,7 +49,7 @@ def report_html(scenes, title='What stands on the table', notes=()):
         residual_cm=round(pictures.RESIDUAL_M * 100))
 
 
-def write_report(path, scenes, title='What stands on the table', notes=()):
+def write_report(path, scenes, title='Objects on the table', notes=()):
     """Write `report_html` to a file, or to report.html in a folder; return the file's path."""
     path = Path(path)
     if path.suffix.lower() not in ('.html', '.htm'):

@@ -31,7 +31,7 @@ def rerun_sdk():
     return rerun
 
 
-def write_recording(path, scenes, title='What stands on the table'):
+def write_recording(path, scenes, title='Objects on the table'):
     """
     Write ReportScenes into one .rrd file, each at its number on the timeline `scene`.
 

@@ -108,11 +108,11 @@ def test_the_number_of_workers_and_the_place_do_not_matter(tmp_path, ran):
 
 
 def test_a_failing_step_names_its_log_and_leaves_no_record(tmp_path):
-    step = plan.Step('x/best/A', 'best', 'parse', ('parse', 'no-such-set', '--model', 'm',
+    step = plan.Step('x/best/A', 'best', 'parse', ('parse', 'set', '--model', 'no-such-model',
                                                    '--out', 'o'), (), tmp_path / 'out.json')
     with pytest.raises(HoocError, match='x_best_A.log'):
         quiet([step], tmp_path)
-    assert 'no-such-set' in (tmp_path / 'logs' / 'x_best_A.log').read_text()
+    assert 'no-such-model' in (tmp_path / 'logs' / 'x_best_A.log').read_text()
     assert run.load_records(tmp_path) == {}
 
 

@@ -69,8 +69,8 @@ def read_pools(path):
     """
     stages = read_json(path).get('stages')
     if not stages:
-        raise HoocError(f'{path} does not say what the stages lose; write it with hooc evaluate '
-                        '--model MODEL --stages --json')
+        raise HoocError(f'{path} does not say what the stages lose; write it with hooc stages '
+                        '--model MODEL --json')
     return pools_of(stages)
 
 

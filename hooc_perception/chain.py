@@ -21,9 +21,10 @@ NODES = (*CHAIN, REPLAY)
 
 PROFILES = ('paper', 'best', 'fast')
 STAGES = ('observe', 'classify', 'propose', 'parse')
-# The stages whose parameters a node declares.
+# The stages whose parameters a node declares. Candidates are ranked by the pixel costs of `parse`,
+# and parsing proposes again: both declare both.
 STAGES_OF = {INGESTION: ('observe',), CLASSIFICATION: ('observe', 'classify'),
-             CANDIDATES: ('observe', 'propose'),
+             CANDIDATES: ('observe', 'propose', 'parse'),
              PARSING: ('observe', 'propose', 'parse'), REPLAY: ()}
 
 

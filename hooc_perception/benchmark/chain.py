@@ -5,9 +5,8 @@
 from dataclasses import dataclass
 import resource
 
-from hooc_perception.core.pipeline import Pipeline
-from hooc_perception.core.profiles import profile
 from hooc_perception.core.types import DepthView
+from hooc_perception.parser import Parser
 import numpy as np
 
 RUNS = 3
@@ -36,9 +35,9 @@ def chain_times(folder, scene):
 
     The first run compiles and warms up; it is not counted.
     """
-    pipeline = Pipeline(folder.models, folder.classifier, profile(folder.profile), folder.seed)
+    parser = Parser.load(folder, max_instances=0, sigmas=False)
     views = [DepthView(view.camera, view.depth) for view in scene.views]
-    parsed = [pipeline.parse_scene(views) for _ in range(RUNS + 1)][1:]
+    parsed = [parser.parse(views, folder.seed).parsed for _ in range(RUNS + 1)][1:]
     stages = parsed[0].seconds
     return ChainTimes(
         folder.profile,

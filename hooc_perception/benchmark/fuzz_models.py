@@ -10,12 +10,11 @@ import shutil
 from hooc_perception.benchmark.fuzz_bags import small_scene
 from hooc_perception.benchmark.mutate import odd_array
 from hooc_perception.core.classification.classify import classify
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.hypotheses.propose import propose
-from hooc_perception.core.parsing.parse import parse
 from hooc_perception.core.profiles import profile, with_overrides
 from hooc_perception.core.segment.observe import observe
-from hooc_perception.core.types import Candidates, PixelProbabilities, RectifiedView
+from hooc_perception.core.types import PixelProbabilities, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.objects.catalogue import CATALOGUE
 from hooc_perception.objects.derive import derive
@@ -77,9 +76,8 @@ def _model_case(rng, folder):
     bad = replace(models[0], **{name: odd_array(getattr(models[0], name), rng)})
     models = _saved(folder, (bad, *models[1:]), {}).models
     chosen = with_overrides(profile('fast'), _CHEAP)
-    pool = propose(observation, probabilities, models, chosen.propose, stage_rng(0, 'fuzz/a'))
-    parse(observation, probabilities, pool, models, chosen.parse, stage_rng(0, 'fuzz/b'), 0,
-          lambda objects, turn: Candidates.empty())
+    frame, method = Frame(observation, probabilities, models), chosen.method()
+    method.parse(frame, method.propose(frame, 0), 0)
 
 
 def model_cases():

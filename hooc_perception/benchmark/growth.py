@@ -10,10 +10,10 @@ import time
 
 from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile as named_profile
 from hooc_perception.core.types import DepthView
 from hooc_perception.errors import HoocError
+from hooc_perception.parser import Parser
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.synthesis.scatter import ScatterConfig
 from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
@@ -131,10 +131,10 @@ def _measure(folder, chosen, setting, seed):
                                   setting['pixels'], seed)
     models, classifier = with_categories(folder.models, folder.classifier,
                                          setting['categories'], stage_rng(seed, 'growth/sizes'))
-    pipeline = Pipeline(models, classifier, chosen, seed)
+    parser = Parser(models, classifier, chosen)
     _reset_peak()
     start = time.process_time()
-    parsed = pipeline.parse_scene(views)
+    parsed = parser.parse(views, seed).parsed
     seconds = time.process_time() - start
     return Point(setting, seconds, _peak_mb(), standing, len(parsed.pool), len(parsed.objects))
 

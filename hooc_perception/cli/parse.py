@@ -2,17 +2,24 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc parse`: the whole chain over a scene set or a bag in one process, no ROS."""
 
+from argparse import ArgumentParser, Namespace
+from collections.abc import Sequence
 from itertools import repeat
 import time
+from typing import Any, TYPE_CHECKING
 
 from hooc_perception.chain import PROFILES
 from hooc_perception.cli import options
 from hooc_perception.errors import HoocError
 
+if TYPE_CHECKING:
+    from hooc_perception.io.scenes.scene import RecordedScene
+    from hooc_perception.parser import Parser
+
 HELP = 'find the objects of a scene set or a bag, in one process without ROS'
 
 
-def add_arguments(parser):
+def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('set', help='folder of a scene set, a BOP dataset or a bag')
     parser.add_argument('--model', required=True, help='model folder that hooc train wrote')
@@ -25,23 +32,22 @@ def add_arguments(parser):
     parser.add_argument('--true-poses', action='store_true',
                         help='setting B: the true poses are among the candidates')
     parser.add_argument('--sigmas', action='store_true',
-                        help='also estimate how far off each pose may be')
+                        help='also estimate the uncertainty of each pose')
     parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
                         help='change one parameter of the profile; may be repeated')
     options.add_executor(parser)
 
 
-def run(args):
+def run(args: Namespace) -> int | None:
     """Parse every scene, write the results of those that could be; return the exit code."""
     from hooc_perception.cli.categories import category_gap, warn_of_gap
     from hooc_perception.cli.failures import tell_failures
     from hooc_perception.cli.overrides import overrides_of
     from hooc_perception.cli.places import file_place
     from hooc_perception.cli.sources import load_source, provenance
-    from hooc_perception.core.pipeline import Pipeline
-    from hooc_perception.core.profiles import profile, with_overrides
     from hooc_perception.executor import executor, spread
-    from hooc_perception.io.scenes.results import scene_result, write_results
+    from hooc_perception.io.scenes.results import scene_entry, write_results
+    from hooc_perception.parser import Parser
     from hooc_perception.trained.folder import load_model_folder
     from tqdm import tqdm
 
@@ -50,11 +56,9 @@ def run(args):
     scene_set = load_source(args.set, folder)
     of_file, of_scene = provenance(scene_set, args.model, out)
     names = [m.name for m in folder.models]
-    chosen = with_overrides(profile(args.profile or folder.profile),
-                            overrides_of(args.set_parameter))
+    parser = Parser.load(folder, args.profile, parameters=overrides_of(args.set_parameter),
+                         max_instances=scene_set.max_instances, sigmas=args.sigmas)
     seed = folder.seed if args.seed is None else args.seed
-    pipeline = Pipeline(folder.models, folder.classifier, chosen, seed, scene_set.max_instances,
-                        args.sigmas)
     scenes = scene_set.selected(args.scene).scenes
     if args.true_poses:
         _check_true_poses(scenes, names, category_gap(names, scene_set.category_names, args.set))
@@ -64,15 +68,15 @@ def run(args):
     results, failures = [], {}
     with executor(args.executor):
         # One scene at a time on the cores at hand, which the stages share out between them.
-        done = spread(_parsed, repeat(pipeline), (_read(s, args.true_poses) for s in scenes))
+        done = spread(_parsed, repeat(parser), repeat(seed),
+                      (_read(s, args.true_poses) for s in scenes))
         for scene, (parsed, seconds) in zip(scenes, tqdm(
                 done, total=len(scenes), desc='parsing', unit='scene', disable=None)):
             if isinstance(parsed, HoocError):
                 failures[scene.name] = parsed
                 continue
-            results.append(scene_result(
-                scene.name, parsed, names, seconds, profile=chosen.name, seed=seed,
-                setting=setting, stage_seconds=parsed.seconds, **scene.world, **of_scene))
+            results.append(scene_entry(scene.name, parsed, seconds, profile=parser.profile.name,
+                                       seed=seed, setting=setting, **scene.world, **of_scene))
     if results or not failures:
         write_results(out, scene_set.name, results, setting=setting, **of_file)
         print(f'{len(results)} scenes, {sum(len(r["objects"]) for r in results)} objects -> '
@@ -80,8 +84,9 @@ def run(args):
     return tell_failures(failures)
 
 
-def _check_true_poses(scenes, known, gap):
-    """Refuse scenes whose true poses cannot all be among the candidates."""
+def _check_true_poses(scenes: 'Sequence[RecordedScene]', known: Sequence[str],
+                      gap: str | None) -> None:
+    """Reject scenes whose true poses cannot all be among the candidates."""
     for scene in scenes:
         if scene.source_truth is None:
             raise HoocError(f'scene {scene.name} has no ground_truth.yaml, which --true-poses '
@@ -90,7 +95,7 @@ def _check_true_poses(scenes, known, gap):
             raise HoocError(f'--true-poses: {gap}')
 
 
-def _read(scene, with_truth):
+def _read(scene: 'RecordedScene', with_truth: bool) -> Any:
     """Return (DepthViews, truth or None) of a scene, or the HoocError that it gave."""
     try:
         return scene.depth(), scene.truth if with_truth else None
@@ -98,9 +103,9 @@ def _read(scene, with_truth):
         return error
 
 
-def _parsed(pipeline, read):
+def _parsed(parser: 'Parser', seed: int, read: Any) -> tuple[Any, float]:
     """
-    Return (ParsedScene, seconds), or (HoocError, NaN) where the scene cannot be parsed.
+    Return (dict of the Scene, seconds), or (HoocError, NaN) where it cannot be parsed.
 
     :param read: what `_read` gave; the truth makes it setting B.
     """
@@ -108,9 +113,10 @@ def _parsed(pipeline, read):
     if isinstance(read, HoocError):
         return read, float('nan')
     views, truth = read
-    change = None if truth is None else with_true_poses(truth, pipeline.models)
+    change = None if truth is None else with_true_poses(truth, parser.models)
     start = time.monotonic()
     try:
-        return pipeline.parse_scene(views, change), time.monotonic() - start
+        scene = parser.parse(views, seed, change)
+        return scene.to_dict(), time.monotonic() - start
     except HoocError as error:
         return error, float('nan')

@@ -28,7 +28,7 @@ _SCORES = ('hooc_perception.evaluation.as_json', 'hooc_perception.evaluation.eva
 CODE = {
     'twin': ('hooc_perception.synthesis.twin',),
     'train': ('hooc_perception.training.train', _SETS),
-    'parse': ('hooc_perception.core.pipeline', 'hooc_perception.core.profiles',
+    'parse': ('hooc_perception.parser', 'hooc_perception.core.profiles',
               'hooc_perception.evaluation.true_poses', 'hooc_perception.trained.folder',
               'hooc_perception.io.scenes.results', _SETS),
     'baseline': ('hooc_perception.evaluation.baselines', _SETS),

@@ -7,10 +7,9 @@ import time
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import CANDIDATES, STAGES_OF
-from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.hypotheses.propose import propose
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.segment.observe import observe
-from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.nodes.model import camera_names, model_of, node_profile, parser_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.inputs.view_topics import ViewInput
 from hooc_perception.ros.lifecycle.spin import run_node
@@ -30,7 +29,7 @@ class CandidateNode(StageNode):
     def configure(self):
         """Load the generic models, build the endpoints."""
         model = model_of(self)
-        self.models = model.models
+        self.model, self.parser = model, parser_of(self, model)
         warmed(self, model, self.try_out)
         self.poses = self.publisher(PoseArray, 'candidates/poses')
         self.attributes = self.publisher(PointCloud2, 'candidates/attributes')
@@ -40,16 +39,17 @@ class CandidateNode(StageNode):
 
     def try_out(self, views, probabilities, candidates, models):
         """Propose for a made-up scene."""
-        propose(observe(views, self.parameters['observe']), probabilities, models,
-                self.parameters['propose'], stage_rng(self.config.seed, 'propose'))
+        observation = observe(views, self.parameters['observe'])
+        self.parser.propose(Frame(observation, probabilities, models), self.config.seed)
 
     def on_set(self, stamp_ns, observation, messages):
         """Propose candidates for one frame set."""
         start = time.monotonic()
         probabilities = probabilities_from_message(messages['probabilities'], observation,
-                                                   len(self.models))
-        candidates = propose(observation, probabilities, self.models, self.parameters['propose'],
-                             stage_rng(self.config.seed, 'propose'))
+                                                   len(self.model.models))
+        self.parser = self.parser.changed(node_profile(self, self.model))
+        candidates = self.parser.propose(self.parser.frame(observation, probabilities),
+                                         self.config.seed)
         poses, attributes = candidates_messages(candidates,
                                                 header(stamp_ns, self.config.target_frame))
         self.attributes.publish(attributes)

@@ -6,11 +6,11 @@ import sys
 import time
 
 from hooc_perception.chain import CLASSIFICATION, STAGES_OF
-from hooc_perception.core.classification.classify import classify, KIND_PAPER
+from hooc_perception.core.classification.classify import KIND_PAPER
 from hooc_perception.core.segment.checks import rig_trouble
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.errors import HoocError
-from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.nodes.model import camera_names, model_of, node_profile, parser_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.inputs.view_topics import ViewInput
 from hooc_perception.ros.lifecycle.spin import run_node
@@ -38,9 +38,9 @@ class ClassificationNode(StageNode):
             self.classifier.get('kind'), KIND_PAPER) else ()
         if self.trained and len(self.names) != len(self.trained):
             raise HoocError(rig_trouble(self.names, self.trained))
-        warmed(self, model, lambda views, *_: classify(
-            observe(views, self.parameters['observe']), self.classifier,
-            self.parameters['classify']))
+        self.model, self.parser = model, parser_of(self, model)
+        warmed(self, model, lambda views, *_: self.parser.classify(
+            observe(views, self.parameters['observe'])))
         self.probabilities = self.publisher(PointCloud2, 'pixels/probabilities')
         self.labels = [self.publisher(Image, 'pixels/<camera>/labels', f'pixels/{name}/labels')
                        for name in self.names]
@@ -56,7 +56,8 @@ class ClassificationNode(StageNode):
             self.diagnostics.warn('model', 'other_rig', trouble)
         else:
             self.diagnostics.ok('model')
-        probabilities = classify(observation, self.classifier, self.parameters['classify'])
+        self.parser = self.parser.changed(node_profile(self, self.model))
+        probabilities = self.parser.classify(observation)
         self.probabilities.publish(
             probabilities_message(probabilities, observation, self.classes, head))
         seconds = time.monotonic() - start

@@ -10,15 +10,11 @@ import time
 from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import PARSING, STAGES_OF
 from hooc_perception.core.config import param
-from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.parsing.calibration import finished, with_sigmas
-from hooc_perception.core.parsing.parse import parse
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.parsing.tracking import TrackConfig, Tracker
 from hooc_perception.core.parsing.unexplained import unexplained_points
-from hooc_perception.core.parsing.verifier import Verifier
-from hooc_perception.core.pipeline import proposer
 from hooc_perception.core.segment.observe import observe
-from hooc_perception.nodes.model import camera_names, model_of
+from hooc_perception.nodes.model import camera_names, model_of, node_profile, parser_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.health.diagnostics import WARN
 from hooc_perception.ros.inputs.view_topics import ViewInput
@@ -30,7 +26,7 @@ from hooc_perception.ros.messages.stages import (
 )
 from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_of, tell
 from hooc_perception.ros.outputs.detect_service import DetectService
-from hooc_perception.ros.outputs.detected import detected_scene
+from hooc_perception.ros.outputs.found import found_scene
 from hooc_perception.ros.outputs.object_output import ObjectOutput
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import SetBool, Trigger
@@ -64,9 +60,10 @@ class ParsingNode(StageNode):
         """Load the generic models, build the endpoints."""
         model = model_of(self)
         self.models, self.enabled = model.models, True
-        self.verifier = Verifier.from_arrays(model.classifier)
         limit = self.config.max_instances
-        self.max_instances = model.max_instances if limit < 0 else limit
+        self.model = model
+        self.parser = parser_of(self, model, model.max_instances if limit < 0 else limit,
+                                self.config.sigmas)
         warmed(self, model, self.try_out)
         self.tracker = Tracker(model.models, self.config)
         self.output = ObjectOutput(self, model.models, [
@@ -84,18 +81,12 @@ class ParsingNode(StageNode):
         self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
 
     def try_out(self, views, probabilities, candidates, models):
-        """Parse a made-up scene, and propose again for what its first object leaves."""
+        """Parse a made-up scene."""
         observation = observe(views, self.parameters['observe'])
-        self.more(observation, probabilities, models)(candidates.take([0]), 1)
-        parsed = parse(observation, probabilities, candidates, models, self.parameters['parse'],
-                       stage_rng(self.config.seed, 'parse'), self.max_instances,
-                       verifier=self.verifier)
+        frame = Frame(observation, probabilities, models)
+        parsed = self.parser.method.parse(frame, candidates, self.config.seed,
+                                          self.parser.max_instances)
         unexplained_points(observation, parsed.objects, models)
-
-    def more(self, observation, probabilities, models):
-        """Return the re-proposal that `parse` calls every round."""
-        return proposer(observation, probabilities, models, self.parameters['propose'],
-                        self.config.seed)
 
     def activate(self):
         """Say what the class ids mean."""
@@ -115,22 +106,16 @@ class ParsingNode(StageNode):
         start = time.monotonic()
         n = len(self.models)
         probabilities = probabilities_from_message(messages['probabilities'], observation, n)
-        parsed = parse(
-            observation, probabilities,
+        self.parser = self.parser.changed(node_profile(self, self.model), self.config.sigmas)
+        parsed = self.parser.decide(
+            self.parser.frame(observation, probabilities),
             candidates_from_messages(messages['poses'], messages['attributes'], n),
-            self.models, self.parameters['parse'], stage_rng(self.config.seed, 'parse'),
-            self.max_instances, self.more(observation, probabilities, self.models), self.verifier)
-        if self.config.sigmas:
-            parsed = with_sigmas(
-                parsed, observation, probabilities, self.models, self.parameters['parse'],
-                stage_rng(self.config.seed, 'sigmas'))
-        parsed = finished(parsed, observation, self.models, self.parameters['parse'],
-                          self.verifier)
+            self.config.seed)
         self.tracker.config = self.config
         ids, objects = self.tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
         left = unexplained_points(observation, objects, self.models)
-        scene = detected_scene(parsed, ids, self.models, stamp_ns, self.config.target_frame)
+        scene = found_scene(parsed, ids, self.models, stamp_ns, self.config.target_frame)
         age_s = (self.now_ns() - stamp_ns) * 1e-9
         self.output.publish(parsed, ids, stamp_ns, self.config.target_frame, age_s, left)
         self.answered = time.monotonic()

@@ -9,15 +9,13 @@ looks too good on what it has seen.
 
 from dataclasses import dataclass, replace
 
-from hooc_perception.core.classification.classify import classify
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.hypotheses.propose import propose
-from hooc_perception.core.parsing.search import search_scene
+from hooc_perception.core.methods.joint import JointMethod
 from hooc_perception.core.parsing.verifier import FEATURES, features
-from hooc_perception.core.pipeline import Pipeline
 from hooc_perception.core.profiles import profile as profile_of
-from hooc_perception.core.segment.observe import observe
+from hooc_perception.errors import HoocError
+from hooc_perception.parser import Parser
 from hooc_perception.synthesis.training_scenes import training_scene
 from hooc_perception.training.fit_forest import fit, FitConfig, quantise, thresholds
 from hooc_perception.training.fused_scenes import FusedScenesConfig, scene_config
@@ -71,19 +69,19 @@ def _scene(models, cameras, classifier, config, base, chain, seed, max_instances
     strength = float(rng.uniform(config.reshape_low, config.reshape_high))
     scene = training_scene(models, cameras, rng,
                            replace(base, rig=rig, reshape_strength=strength))
-    pipeline = Pipeline(models, classifier, chain, seed, max_instances)
-    observation = observe(scene.views)
-    probabilities = classify(observation, classifier, chain.classify)
-    pool = propose(observation, probabilities, models, chain.propose, pipeline.rng('propose'))
-    state, _, _ = search_scene(observation, probabilities, pool, models, chain.parse,
-                               pipeline.rng('parse'), max_instances,
-                               pipeline.more(observation, probabilities))
-    x = features(state.evidence, state.pool, state.stats, state.lists, models, state.weighed())
+    parser = Parser(models, classifier, chain, max_instances)
+    method = parser.method
+    if not isinstance(method, JointMethod):
+        raise HoocError(f'the profile {chain.name} has no verifier; train without one')
+    observation = parser.observe(scene.views)
+    frame = parser.frame(observation, parser.classify(observation))
+    search = method.search(frame, method.propose(frame, seed), seed, max_instances)
+    x = features(search)
     right = np.zeros(len(x), np.uint8)
     for o in scene.objects:
         reach = config.right_within * models[o.category - 1].longest_side
-        right |= ((state.pool.category == o.category)
-                  & (np.linalg.norm(state.pool.translation - o.translation, axis=1) < reach))
+        right |= ((search.pool.category == o.category)
+                  & (np.linalg.norm(search.pool.translation - o.translation, axis=1) < reach))
     return x, right
 
 

@@ -4,6 +4,8 @@
 
 from types import SimpleNamespace
 
+from hooc_perception.core.frame.costs import PixelCosts
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import posed_vertices, stage_rng
 from hooc_perception.core.hypotheses.propose import propose, ProposeConfig
 from hooc_perception.core.render import render_depth
@@ -96,7 +98,7 @@ def desk_with(models, truth, seed=0):
     The depth has 1 mm of noise, 1 % of holes and whole millimetres. Fields: models (class ids
     1 box, 2 ball, 3 can), cameras, truth, meshes (posed), clean (depth, inf = none), classes
     ((H, W), 0 none) and views (raw DepthView) of each camera, observation, probabilities
-    (from the true classes, sure but not certain).
+    (from the true classes, sure but not certain), and the frame that holds both.
     """
     rng = np.random.default_rng(seed)
     cameras = tuple(camera(f'camera{i}', 0.3 + 2 * np.pi * i / 3, 0.75, 0.75, height=120,
@@ -113,10 +115,11 @@ def desk_with(models, truth, seed=0):
         noisy[~np.isfinite(depth) | (rng.random(depth.shape) < 0.01)] = np.nan
         views.append(DepthView(c, noisy.astype(np.float32)))
     observation = observe([rectify(v) for v in views])
+    probabilities = probabilities_of(observation, classes, len(models))
     return SimpleNamespace(
         models=models, cameras=cameras, truth=truth, meshes=meshes, clean=clean,
         classes=classes, views=tuple(views), observation=observation,
-        probabilities=probabilities_of(observation, classes, len(models)))
+        probabilities=probabilities, frame=Frame(observation, probabilities, models))
 
 
 def probabilities_of(observation, classes, n_models):
@@ -170,5 +173,4 @@ def cheap():
 @pytest.fixture(scope='session')
 def desk_pool(desk, cheap):
     """Return the Candidates that are proposed for the desk."""
-    return propose(desk.observation, desk.probabilities, desk.models, cheap,
-                   stage_rng(0, 'propose'))
+    return propose(desk.frame, cheap, PixelCosts(), stage_rng(0, 'propose'))

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters: declared once, checked when they are set, with a sentence that names them."""
 
-from dataclasses import dataclass, fields, FrozenInstanceError, replace
+from dataclasses import dataclass, FrozenInstanceError, replace
 
-from hooc_perception.core.config import Config, param
-from hooc_perception.core.profiles import Profile
+from hooc_perception.chain import PROFILES
+from hooc_perception.core.config import Config, group, param
+from hooc_perception.core.profiles import profile
 from hooc_perception.errors import HoocError
 import pytest
 
@@ -60,20 +61,41 @@ def test_nothing_changes_afterwards():
         Kettle().cups = 3
 
 
-STAGES = [f.name for f in fields(Profile) if f.name != 'name']
+@dataclass(frozen=True)
+class Kitchen(Config):
+    """Parameters of its own and those of a kettle with another default."""
+
+    lights: int = param(2, 'How many lamps.', low=0)
+    kettle: Kettle = group(Kettle(cups=6))
 
 
-@pytest.mark.parametrize('stage', STAGES)
-def test_every_parameter_says_what_it_means_and_its_default_is_allowed(stage):
-    config = getattr(Profile(), stage)
-    assert isinstance(config, Config)
-    for f in fields(config):
-        assert len(f.metadata['doc']) > 8, f.name
-        assert type(f.default) in (float, int, bool, str), f.name
+def test_a_group_belongs_to_the_names_of_the_outer_one():
+    assert list(Kitchen.parameters()) == ['lights', 'litres', 'cups', 'whistles', 'fuel']
+    assert Kitchen().values() == {'lights': 2, 'litres': 1.5, 'cups': 6, 'whistles': True,
+                                  'fuel': 'gas'}
+    changed = Kitchen().changed({'cups': 9, 'lights': 0})
+    assert (changed.lights, changed.kettle) == (0, Kettle(cups=9))
+    assert Kitchen().changed({}) == Kitchen()
+    with pytest.raises(HoocError, match="no parameter 'spoons'"):
+        Kitchen().changed({'spoons': 1})
+    with pytest.raises(HoocError, match='cups is -1, outside'):
+        Kitchen().changed({'cups': -1})
+
+
+STAGES = [(name, stage) for name in PROFILES for stage in ('observe', 'classify', 'propose',
+                                                           'parse')]
+
+
+@pytest.mark.parametrize('name, stage', STAGES)
+def test_every_parameter_says_what_it_means_and_its_default_is_allowed(name, stage):
+    config = profile(name).stage(stage)
+    for parameter, f in config.parameters().items():
+        assert len(f.metadata['doc']) > 8, parameter
+        assert type(f.default) in (float, int, bool, str), parameter
         assert isinstance(f.metadata['runtime'], bool)
         if isinstance(f.default, str):
-            assert f.default in f.metadata['choices'], f.name
+            assert f.default in f.metadata['choices'], parameter
         elif not isinstance(f.default, bool):
-            assert f.metadata['low'] is not None, f'{f.name} has no lower bound'
-            with pytest.raises(HoocError, match=f'parameter {f.name} '):
-                replace(config, **{f.name: type(f.default)(f.metadata['low'] - 1)})
+            assert f.metadata['low'] is not None, f'{parameter} has no lower bound'
+            with pytest.raises(HoocError, match=f'parameter {parameter} '):
+                config.changed({parameter: type(f.default)(f.metadata['low'] - 1)})

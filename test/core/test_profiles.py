@@ -2,9 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Profiles by name, and single parameters changed."""
 
-from dataclasses import fields
-
 from hooc_perception.chain import PROFILES
+from hooc_perception.core.methods.joint import JointMethod
+from hooc_perception.core.methods.paper import PaperMethod
 from hooc_perception.core.profiles import Profile, profile, with_overrides
 from hooc_perception.errors import HoocError
 import pytest
@@ -19,15 +19,14 @@ def test_every_profile_goes_by_its_name(name):
 def test_the_profiles_are_what_they_say():
     best, fast, paper = (profile(name) for name in ('best', 'fast', 'paper'))
     assert best == Profile()
-    assert paper.propose.method == 'fragments'
-    assert (paper.parse.search, paper.parse.rounds) == ('genetic', 0)
+    assert isinstance(paper.method(), PaperMethod)
     # The paper's numbers, which tuning must not touch.
     assert (paper.propose.draws, paper.propose.keep) == (200, 5)
-    assert (paper.parse.population, paper.parse.start_size) == (100, 10.0)
-    assert (paper.parse.elite, paper.parse.drawn, paper.parse.new) == (0.2, 0.2, 0.1)
-    assert paper.parse.cuts == 3
-    assert fast.propose.method == best.propose.method
-    assert fast.parse.search == best.parse.search
+    genetic = paper.parse.genetic
+    assert (genetic.population, genetic.start_size) == (100, 10.0)
+    assert (genetic.elite, genetic.drawn, genetic.new) == (0.2, 0.2, 0.1)
+    assert genetic.cuts == 3
+    assert isinstance(fast.method(), JointMethod) and isinstance(best.method(), JointMethod)
     assert fast.propose.samples < best.propose.samples
     assert fast.parse.rounds <= best.parse.rounds
 
@@ -47,8 +46,8 @@ def test_single_parameters_change_and_the_rest_stays():
     assert changed.classify == best.classify
     assert changed.name == 'best'
     for stage in ('observe', 'propose', 'parse'):
-        a, b = getattr(best, stage), getattr(changed, stage)
-        differing = {f.name for f in fields(a) if getattr(a, f.name) != getattr(b, f.name)}
+        a, b = best.stage(stage).values(), changed.stage(stage).values()
+        differing = {name for name in a if a[name] != b[name]}
         assert differing <= {'deadline_s', 'rounds', 'samples', 'max_depth_m'}
     assert best == profile('best')
     assert with_overrides(best, {}) == best
@@ -69,10 +68,31 @@ def test_an_odd_name_is_named_too(key):
 
 
 @pytest.mark.parametrize('key, value, sentence', [
-    ('parse.search', 'luck', 'search is .luck.; choose one of joint, genetic'),
+    ('parse.swaps', 'yes', 'swaps is .yes., but must be of type bool'),
     ('parse.rounds', 1.5, 'rounds is 1.5, but must be of type int'),
     ('propose.samples', -1, 'samples is -1, outside'),
     ('observe.max_depth_m', None, 'max_depth_m is None')])
 def test_a_value_that_is_refused_is_named(key, value, sentence):
     with pytest.raises(HoocError, match=sentence):
         with_overrides(profile('fast'), {key: value})
+
+
+@pytest.mark.parametrize('name, key, belongs_to', [
+    ('best', 'parse.elite', 'paper'), ('fast', 'propose.draws', 'paper'),
+    ('paper', 'parse.tolerance_m', 'best and fast'),
+    ('paper', 'propose.samples', 'best and fast')])
+def test_a_parameter_without_effect_is_refused_by_name(name, key, belongs_to):
+    with pytest.raises(HoocError, match=f'{key} has no effect in the profile {name}: only the '
+                                        f'method of {belongs_to} has it'):
+        with_overrides(profile(name), {key: 0.5})
+
+
+@pytest.mark.parametrize('name', PROFILES)
+def test_every_parameter_can_be_set_by_its_flat_name(name):
+    chosen = profile(name)
+    for stage in ('observe', 'classify', 'propose', 'parse'):
+        for parameter, value in chosen.stage(stage).values().items():
+            other = not value if isinstance(value, bool) else value + 1e-6 * isinstance(
+                value, float) + isinstance(value, int)
+            changed = with_overrides(chosen, {f'{stage}.{parameter}': other})
+            assert changed.stage(stage).values()[parameter] == other

@@ -5,6 +5,8 @@
 from types import SimpleNamespace
 
 from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Energy, PixelProbabilities
 from hooc_perception.evaluation import rerun as rerun_module
 from hooc_perception.evaluation.paper_tables import energy_table
@@ -36,30 +38,38 @@ def chain(monkeypatch, folder, posed_truths, tiny):
         return next(name for name, scene in scenes.items()
                     if np.array_equal(scene.depth()[0].depth, depth, equal_nan=True))
 
-    def classify(observation, classifier, config):
-        truths, parts = posed_truths[name_of(observation.views[0].depth)], []
-        for j, view in enumerate(observation.views):
-            v, u = np.nonzero(view.foreground)
-            p = np.zeros((len(u), len(folder.models) + 1), np.uint8)
-            p[np.arange(len(u)),
-              np.maximum(true_classes(truths, folder.models, view)[v, u], 0)] = 255
-            parts.append((np.full(len(u), j, np.uint8), np.stack([u, v], 1).astype(np.uint16), p))
-        return PixelProbabilities(*(np.concatenate(x) for x in zip(*parts)))
+    class Perfect:
+        """Stands in for a Parser: knows all classes and poses, leaves out the first object."""
 
-    class Pipeline:
-        def __init__(self, models, classifier, profile, seed, max_instances):
-            self.models = models
+        models, profile = folder.models, SimpleNamespace(observe=ObserveConfig())
 
-        def parse_scene(self, views):
-            truths = posed_truths[name_of(views[0].depth)]
-            pool = as_candidates(truths, self.models)
-            return SimpleNamespace(pool=pool, objects=pool.take(np.arange(1, len(pool))),
-                                   energy=Energy(0.1, 0.2, 0.3), seconds={'parse': 0.5})
+        @classmethod
+        def load(cls, loaded, profile, sigmas):
+            assert loaded is folder and profile is None and not sigmas
+            return cls()
 
-    monkeypatch.setattr(rerun_module, 'classify', classify)
-    monkeypatch.setattr(rerun_module, 'Pipeline', Pipeline)
-    monkeypatch.setattr(rerun_module, 'named_profile', lambda name: SimpleNamespace(
-        observe=ObserveConfig(), classify=None))
+        def observe(self, views):
+            return observe([rectify(view) for view in views])
+
+        def classify(self, observation):
+            truths, parts = posed_truths[name_of(observation.views[0].depth)], []
+            for j, view in enumerate(observation.views):
+                v, u = np.nonzero(view.foreground)
+                p = np.zeros((len(u), len(folder.models) + 1), np.uint8)
+                p[np.arange(len(u)),
+                  np.maximum(true_classes(truths, folder.models, view)[v, u], 0)] = 255
+                parts.append((np.full(len(u), j, np.uint8),
+                              np.stack([u, v], 1).astype(np.uint16), p))
+            return PixelProbabilities(*(np.concatenate(x) for x in zip(*parts)))
+
+        def parse(self, views, seed):
+            assert seed == folder.seed
+            pool = as_candidates(posed_truths[name_of(views[0].depth)], self.models)
+            return SimpleNamespace(parsed=SimpleNamespace(
+                pool=pool, objects=pool.take(np.arange(1, len(pool))),
+                energy=Energy(0.1, 0.2, 0.3), seconds={'parse': 0.5}))
+
+    monkeypatch.setattr(rerun_module, 'Parser', Perfect)
 
 
 def test_losses_are_where_the_chain_loses(chain, tiny, folder):

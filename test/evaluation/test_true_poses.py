@@ -5,8 +5,8 @@
 from pathlib import Path
 
 from hooc_perception.core.classification.classify import classify
-from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.parsing.parse import parse
+from hooc_perception.core.frame.frame import Frame
+from hooc_perception.core.methods.joint import JointMethod
 from hooc_perception.core.profiles import profile
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
@@ -98,11 +98,24 @@ def unsure_probabilities(observation, truths, models):
     return PixelProbabilities(*(np.concatenate(x) for x in zip(*parts)))
 
 
+class Alone(JointMethod):
+    """The joint method without re-proposal."""
+
+    def propose_more(self, frame, objects, turn, seed):
+        return Candidates.empty()
+
+
+def method_of(name):
+    """Return the method of a profile; whatever it parses, it proposes nothing itself."""
+    chosen = profile(name)
+    return chosen.method() if name == 'paper' else Alone(chosen.propose, chosen.parse)
+
+
 def answer_of(name, observation, probabilities, truths, models):
     """Return the SceneScore of a profile's parsing that knows only the true poses."""
     only_true = as_candidates(truths, models)
-    parsed = parse(observation, probabilities, only_true, models, profile(name).parse,
-                   stage_rng(0, 'parse'), 1)
+    frame = Frame(observation, probabilities, tuple(models))
+    parsed = method_of(name).parse(frame, only_true, 0, 1)
     return score_scene('scene', as_objects(parsed.objects, models), truths,
                        {m.name: m for m in models})
 

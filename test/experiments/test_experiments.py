@@ -78,7 +78,7 @@ def test_changed_code_runs_its_rows_again_but_for_those_that_are_kept(tmp_path, 
     ran.clear()
     plain = fingerprint.of_code
     monkeypatch.setattr(fingerprint, 'of_code', lambda roots: plain(roots) + (
-        'new' if 'hooc_perception.core.pipeline' in roots or 'evaluation.baselines' in roots[0]
+        'new' if 'hooc_perception.parser' in roots or 'evaluation.baselines' in roots[0]
         else ''))
     quiet(steps, tmp_path, keep=('ppf',))
     assert ran == ['twin/best/A', 'twin/best/B']
@@ -127,10 +127,10 @@ def test_steps_hang_on_the_code_that_they_run():
     # The verifier learns from scenes that the chain has parsed.
     assert {'hooc_perception.training.fit_pixels', 'hooc_perception.synthesis.settle',
             'hooc_perception.core.classification.kernels.pixel_forest',
-            'hooc_perception.core.parsing.parse'} <= set(trained)
+            'hooc_perception.core.parsing.search'} <= set(trained)
     assert 'hooc_perception.evaluation.scores' not in trained
     parsed = fingerprint.modules_of(plan.CODE['parse'])
-    assert 'hooc_perception.core.parsing.parse' in parsed
+    assert 'hooc_perception.core.parsing.search' in parsed
     assert not any(name.startswith('hooc_perception.training') for name in parsed)
 
 

@@ -72,13 +72,12 @@ def played(bundle, tmp_path_factory):
 
 
 def test_nodes_and_one_process_find_the_same_objects(bundle, played):
-    from hooc_perception.core.pipeline import Pipeline
-    from hooc_perception.core.profiles import profile
     from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.parser import Parser
     from hooc_perception.trained.folder import load_model_folder
     scene, model = BagScene(bundle[0]), load_model_folder(bundle[1])
-    alone = Pipeline(model.models, model.classifier, profile('fast'), SEED,
-                     scene.info['max_instances']).parse_scene(scene.views())
+    parser = Parser.load(model, 'fast', max_instances=scene.info['max_instances'], sigmas=False)
+    alone = parser.parse(scene.views(), SEED).parsed
     assert len(alone.objects) > 0
     for answer in played[:2]:
         # The topics carry the first proposals; those of later rounds come behind them.

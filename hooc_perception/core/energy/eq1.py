@@ -87,10 +87,10 @@ class Eq1(ImagesAndVolumes):
         self._depth = np.minimum(np.abs(depth - measured[pixel]), d_max) / d_max
         self._miss = miss[row[pixel], pool.category[owner]]
 
-        self._images = Compositor(
-            offsets, pixel, depth, self._depth + self._miss, self._none_depth + self._none_miss,
-            group=pool.category, max_per_group=max_instances)
-        self._overlap = OverlapTerm(pool, models)
+        super().__init__(
+            Compositor(offsets, pixel, depth, self._depth + self._miss,
+                       self._none_depth + self._none_miss, group=pool.category,
+                       max_per_group=max_instances), OverlapTerm(pool, models))
 
     @property
     def value(self):

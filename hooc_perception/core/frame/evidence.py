@@ -10,6 +10,9 @@ from hooc_perception.core.geometry import inverse
 from hooc_perception.core.render import is_closed
 import numpy as np
 
+# What is shown already at each pixel: owner, depth and cost of the nearest and of the next object.
+Context = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
 
 @dataclass(frozen=True)
 class PixelWeights:

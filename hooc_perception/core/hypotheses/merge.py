@@ -1,14 +1,17 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-One object in the place of two.
+One object instead of two.
 
-A box that is larger than the generic one is readily explained by two of its kind, side by
-side, and no refinement of either leads from there to the one that it is.
+A box that is larger than the generic one is readily explained by two boxes side by side, and no
+refinement of either leads from there to the single one.
 """
 
+from collections.abc import Sequence
+
+from hooc_perception.core.arrays import Float64Array, Int64Array
 from hooc_perception.core.kernels.gauss_newton import SCALES
-from hooc_perception.core.types import Candidates
+from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -16,7 +19,8 @@ CORNERS = np.array([[x, y, z] for x in (-.5, .5) for y in (-.5, .5) for z in (-.
 TOUCHING_M = 0.03
 
 
-def merged_pairs(objects, models):
+def merged_pairs(objects: Candidates, models: Sequence[GenericModel],
+                 ) -> tuple[Candidates, Int64Array]:
     """
     Return (Candidates, pairs): boxes around touching objects of one category.
 
@@ -42,7 +46,8 @@ def merged_pairs(objects, models):
                       like.score), np.array(pairs)
 
 
-def _around(objects, R, i, j):
+def _around(objects: Candidates, R: Float64Array, i: int, j: int,
+            ) -> tuple[Float64Array, Float64Array] | None:
     """Return (centre, size) of the box turned like i around i and j, None if they are apart."""
     half = objects.size[i] / 2
     corners = CORNERS * objects.size[j] @ R[j].T + objects.translation[j] - objects.translation[i]

@@ -1,22 +1,24 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Stage 3: class probabilities and depth become pose candidates of every category.
+Stage 3 of the joint method: model-driven hypotheses become candidates of every category.
 
-Two ways: `fragments`, the paper's (section 4), and `field`, model-driven hypotheses over the
-fused views.
+Hypotheses are sampled and refined in the voxel field (sampling.py), then ranked, refined and
+ranked again in the images.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
-from hooc_perception.core.config import param
-from hooc_perception.core.frame.evidence import hypotheses_of, PixelWeights
+from hooc_perception.core.arrays import Float64Array, Int64Array
+from hooc_perception.core.config import Config, param
+from hooc_perception.core.frame.costs import PixelCosts
+from hooc_perception.core.frame.evidence import Context, Evidence, hypotheses_of
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.frame.kernels import compare as stat
-from hooc_perception.core.frame.workspace import workspace_of
 from hooc_perception.core.hypotheses.sampling import benefit, distinct, sample
-from hooc_perception.core.methods.fragments import FragmentConfig, propose_fragments
-from hooc_perception.core.types import Candidates
+from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -25,110 +27,111 @@ MANY = 120
 
 
 @dataclass(frozen=True)
-class ProposeConfig(FragmentConfig):
-    """Parameters of stage 3; those of FragmentConfig serve the method `fragments`."""
+class ProposeConfig(Config):
+    """Parameters of stage 3 of the joint method."""
 
-    method: str = param('field', 'how candidates are found', choices=('field', 'fragments'))
-    fragments: bool = param(False, 'field: whether the fragments of the pixel classes (the '
-                            "paper's candidates) are added to the hypotheses")
-    samples: int = param(10000, 'field: poses drawn for each category', low=100)
-    pool: int = param(120, 'field: hypotheses a category that are refined in the field', low=5)
-    refine_steps: int = param(20, 'field: steps of refinement in the field', low=0)
-    polish: int = param(15, 'field: hypotheses a category that are refined in the images', low=1)
-    polish_steps: int = param(10, 'field: steps of refinement in the images', low=0)
-    per_category: int = param(15, 'field: candidates a category', low=1)
-    round_samples: int = param(4000, 'field: poses a category in a round of re-proposal', low=10)
-    round_pool: int = param(30, 'field: hypotheses a category refined in such a round', low=1)
-    round_per_category: int = param(6, 'field: candidates a category from such a round', low=1)
-    free_weight: float = param(0.7, 'field: weight of a point in space that is seen through', '',
+    samples: int = param(10000, 'Poses drawn per category.', low=100)
+    pool: int = param(120, 'Hypotheses per category that are refined in the voxel field.', low=5)
+    refine_steps: int = param(20, 'Refinement steps in the voxel field.', low=0)
+    polish: int = param(15, 'Hypotheses per category that are refined in the images.', low=1)
+    polish_steps: int = param(10, 'Refinement steps in the images.', low=0)
+    per_category: int = param(15, 'Candidates per category.', low=1)
+    round_samples: int = param(4000, 'Poses drawn per category in a round of re-proposal.',
+                               low=10)
+    round_pool: int = param(30, 'Hypotheses per category refined in such a round.', low=1)
+    round_per_category: int = param(6, 'Candidates per category from such a round.', low=1)
+    free_weight: float = param(0.7, 'Weight of a free-space violation in the voxel field.', '',
                                0.0, 5.0)
-    shell_weight: float = param(0.6, 'field: weight of a point that has no air in front', '',
-                                0.0, 5.0)
-    size_sigma: float = param(0.2, 'field: log deviation of the size of samples', '', 0.0, 1.0)
-    size_prior: float = param(0.02, 'field: cost of squared log scale', '', 0.0, 1.0)
-    tilted: float = param(0.2, 'field: share of samples in any rotation, not a resting one', '',
+    shell_weight: float = param(0.6, 'Weight of a surface point without free space in front of '
+                                'it.', '', 0.0, 5.0)
+    size_sigma: float = param(0.2, 'Standard deviation of the log size of samples.', '', 0.0, 1.0)
+    size_prior: float = param(0.02, 'Cost of the squared log scale in the voxel field.', '', 0.0,
+                              1.0)
+    tilted: float = param(0.2, 'Share of samples in any rotation instead of a resting one.', '',
                           0.0, 1.0)
-    distrust: float = param(0.03, 'field: least weight of a scene point whatever the classifier '
-                            'says', '', 0.0, 1.0)
-    complexity: float = param(0.1, 'field: cost of a covered pixel in ranking', '', 0.0, 2.0)
+    distrust: float = param(0.03, 'Least weight of a scene point, whatever the classifier says.',
+                            '', 0.0, 1.0)
+    complexity: float = param(0.1, 'Cost per covered pixel in ranking.', '', 0.0, 2.0)
 
 
-def propose(observation, probabilities, models, config=ProposeConfig(), rng=None):
+@dataclass(frozen=True)
+class _Ranking:
+    """How hypotheses are ranked in the images, and how many survive each step."""
+
+    config: ProposeConfig
+    costs: PixelCosts
+    n_refine: int
+    n_keep: int
+
+
+def propose(frame: Frame, config: ProposeConfig, costs: PixelCosts,
+            rng: np.random.Generator) -> Candidates:
     """
     Return Candidates of every category, the best of each first.
 
-    :param observation: Observation of one frame set.
-    :param probabilities: PixelProbabilities of the same.
-    :param models: tuple of GenericModel; class id c is models[c - 1].
+    :param costs: of a pixel, as in parsing.
     :param rng: numpy Generator of this stage.
     """
-    if config.method == 'fragments':
-        return propose_fragments(observation, probabilities, models, config, rng)
-    space = workspace_of(observation, probabilities, models)
-    if space.field is None:
+    if frame.field is None:
         return Candidates.empty()
-    extra = None
-    if config.fragments:
-        found = propose_fragments(observation, probabilities, models, config, rng)
-        extra = hypotheses_of(found, models), found.category
-    H, category = sample(space, models, config, rng, config.samples, config.pool,
-                         config.refine_steps, extra=extra)
-    return _ranked(space, models, config, rng, H, category, lambda evidence: evidence.nothing,
-                   config.polish, config.polish_steps, config.per_category)
+    H, category = sample(frame, frame.models, config, rng, config.samples, config.pool,
+                         config.refine_steps)
+    return _ranked(frame, _Ranking(config, costs, config.polish, config.per_category), rng, H,
+                   category, lambda evidence: evidence.nothing)
 
 
-def propose_more(observation, probabilities, models, objects, config=ProposeConfig(), rng=None):
-    """
-    Return further Candidates for what `objects` (Candidates) leave unexplained.
-
-    Only the `field` method has an answer; the paper proposes once.
-    """
-    space = workspace_of(observation, probabilities, models)
-    if config.method == 'fragments' or space.field is None:
+def propose_more(frame: Frame, objects: Candidates, config: ProposeConfig, costs: PixelCosts,
+                 rng: np.random.Generator) -> Candidates:
+    """Return further Candidates for what `objects` leave unexplained."""
+    if frame.field is None:
         return Candidates.empty()
 
     @cache
-    def shown(evidence):
-        _, lists = evidence.explain(hypotheses_of(objects, models), objects.category,
-                                    PixelWeights(), lists=True)
+    def shown(evidence: Evidence) -> Context:
+        _, lists = evidence.explain(hypotheses_of(objects, frame.models), objects.category,
+                                    costs.weights(), lists=True)
         return evidence.compose(np.arange(len(objects)), lists)
 
-    left = space.coarse.unexplained(shown(space.coarse))
+    left = frame.coarse.unexplained(shown(frame.coarse))
     if not left.any():
         return Candidates.empty()
-    H, category = sample(space, models, config, rng, config.round_samples, config.round_pool,
-                         config.refine_steps, left + 0.02)
-    return _ranked(space, models, config, rng, H, category, shown, config.round_per_category,
-                   config.polish_steps, config.round_per_category)
+    H, category = sample(frame, frame.models, config, rng, config.round_samples,
+                         config.round_pool, config.refine_steps, left + 0.02)
+    few = config.round_per_category
+    return _ranked(frame, _Ranking(config, costs, few, few), rng, H, category, shown)
 
 
-def _ranked(space, models, config, rng, H, category, shown, n_polish, steps, n_keep):
+def _ranked(frame: Frame, ranking: _Ranking, rng: np.random.Generator, H: Float64Array,
+            category: Int64Array, shown: Callable[[Evidence], Context]) -> Candidates:
     """
     Rank hypotheses in the images, refine the best there and return the best of those.
 
-    :param shown: callable Evidence -> the context of what is there already.
+    :param H: (m, 11) hypotheses with their score in the voxel field; `category` (m,).
+    :param shown: Evidence -> the context of what is explained already.
     """
-    weights, coarse = PixelWeights(), space.coarse
+    models, config, coarse = frame.models, ranking.config, frame.coarse
+    weights = ranking.costs.weights()
     stats = coarse.explain(H, category, weights, shown(coarse))
     score = benefit(stats, config.complexity)
     # Half of the places go to the field's own order: it knows what the images hide.
-    rows = np.union1d(distinct(H, category, score, models, n_polish),
-                      distinct(H, category, H[:, 10], models, n_polish // 2))
+    rows = np.union1d(distinct(H, category, score, models, ranking.n_refine),
+                      distinct(H, category, H[:, 10], models, ranking.n_refine // 2))
     H, category, covered = H[rows], category[rows], stats[rows, stat.SHOWN]
-    # A few hundred pixels pin a thing down: large ones need no more, thin ones need them all.
-    for evidence, low, high in ((space.evidence, 0, MANY), (coarse, MANY, 8 * MANY),
-                                (space.coarsest, 8 * MANY, np.inf)):
+    # A few hundred pixels determine a pose: large objects need no more, thin ones need them all.
+    for evidence, low, high in ((frame.evidence, 0, MANY), (coarse, MANY, 8 * MANY),
+                                (frame.coarsest, 8 * MANY, np.inf)):
         mine = np.flatnonzero((low <= covered) & (covered < high))
-        if steps and len(mine):
+        if config.polish_steps and len(mine):
             H[mine, :10] = evidence.polish(
                 H[mine], category[mine], np.full(len(mine), -1), shown(evidence), weights,
-                config.complexity, 0.1, steps, (0.006, 0.08, 0.05), rng)
+                config.complexity, 0.1, config.polish_steps, (0.006, 0.08, 0.05), rng)
     score = benefit(coarse.explain(H, category, weights, shown(coarse)), config.complexity)
-    rows = distinct(H, category, score, models, n_keep)
+    rows = distinct(H, category, score, models, ranking.n_keep)
     return candidates_of(H[rows], category[rows], score[rows], models)
 
 
-def candidates_of(H, category, score, models):
+def candidates_of(H: Float64Array, category: Int64Array, score: Float64Array,
+                  models: tuple[GenericModel, ...]) -> Candidates:
     """Return Candidates from hypotheses (m, 10+), class ids and scores."""
     extents = np.array([models[c - 1].extents for c in category]).reshape(-1, 3)
     return Candidates(category.astype(np.uint16), H[:, :3].copy(),

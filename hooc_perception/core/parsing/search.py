@@ -2,82 +2,123 @@
 # SPDX-License-Identifier: Apache-2.0
 """The joint search of stage 4: choose, refine, propose again, until nothing improves."""
 
+from collections.abc import Callable, Sequence
+
+from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.energy.joint import JointEnergy
-from hooc_perception.core.energy.local_search import local_search
-from hooc_perception.core.frame.evidence import hypotheses_of, PixelWeights
-from hooc_perception.core.frame.workspace import workspace_of
+from hooc_perception.core.energy.local_search import local_search, SearchResult
+from hooc_perception.core.frame.evidence import Context, Evidence, hypotheses_of
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.hypotheses.merge import merged_pairs
 from hooc_perception.core.hypotheses.propose import candidates_of
+from hooc_perception.core.parsing.config import ParseConfig
 from hooc_perception.core.symmetry import half_turns
-from hooc_perception.core.types import Candidates
+from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
 
+# First step lengths of a refinement: metres, radians, log scale.
+STEPS = (0.005, 0.06, 0.04)
 
-def search_scene(observation, probabilities, pool, models, config, rng, max_instances=0,
-                 more=None, late=lambda: False):
+# (chosen objects, round) -> candidates for what they leave unexplained.
+Proposer = Callable[[Candidates, int], Candidates]
+
+
+def search_scene(frame: Frame, pool: Candidates, config: ParseConfig, rng: np.random.Generator,
+                 max_instances: int = 0, more: Proposer | None = None,
+                 late: Callable[[], bool] = lambda: False,
+                 ) -> tuple['Search', SearchResult, Candidates]:
     """
     Alternate discrete search, refinement and re-proposal, coarse first and in full at last.
 
-    The rounds look at every second row and column; what is left in the running then is
-    refined and decided on all pixels.
+    The rounds look at every second row and column; the remaining candidates are then refined
+    and decided on all pixels.
 
+    :param max_instances: most objects per category, 0 = no limit.
+    :param more: proposes anew; None = the pool is all there is.
+    :param late: True once the deadline has passed.
     :return: (Search at its optimum, SearchResult, Candidates that were considered before).
     """
-    space = workspace_of(observation, probabilities, models)
-    state, considered = Search(space.coarse, models, config, max_instances).with_more(pool), pool
+    search = Search(frame.coarse, frame.models, config, max_instances)
+    search.add(pool)
+    considered = pool
     for turn in range(config.rounds + 1):
-        found = state.search(rng, late)
+        found = search.run(rng, late)
         if not found.converged or late():
             break
-        state.merged(config.polish_steps, rng)
+        search.merge_pairs(rng)
         last = turn == config.rounds
-        new = state.polished(config.turn_steps if last else config.polish_steps, rng, last)
+        new = search.refined_copies(config.turn_steps if last else config.polish_steps, rng, last)
         if more is not None and not last and not late():
-            new = new.extended(more(state.pool.take(state.mask), turn + 1))
+            new = new.extended(more(search.chosen, turn + 1))
         considered = considered.extended(new)
-        state = state.take(state.in_the_running(config.kept)).with_more(new)
+        search = search.subset(search.shortlist(config.kept))
+        search.add(new)
     if found.converged and not late():
-        found = state.search(rng, late)
-    state = state.on(space.evidence, state.in_the_running(config.finalists))
+        found = search.run(rng, late)
+    search = search.at_resolution(frame.evidence, search.shortlist(config.finalists))
     if found.converged and not late():
-        found = state.with_more(state.polished(config.polish_steps, rng)).search(rng, late)
-    return state, found, considered
+        search.add(search.refined_copies(config.polish_steps, rng))
+        found = search.run(rng, late)
+    return search, found, considered
 
 
 class Search:
-    """A pool with its pixel lists on one resolution, and the subset chosen so far."""
+    """
+    A pool with its pixel lists at one resolution, and the subset chosen so far.
 
-    def __init__(self, evidence, models, config, max_instances):
+    :ivar pool: Candidates; `mask` (n,) bool, which of them are chosen.
+    :ivar stats: (n, STATS) of the pool, each candidate alone in the images; `lists` its pixels.
+    """
+
+    def __init__(self, evidence: Evidence, models: Sequence[GenericModel], config: ParseConfig,
+                 max_instances: int) -> None:
         self.evidence, self.models, self.config = evidence, models, config
         self.max_instances = max_instances
-        self.pool, self.mask, self.odds = Candidates.empty(), np.zeros(0, bool), None
-        self.stats = self.lists = self.energy = None
+        self.pool, self.mask = Candidates.empty(), np.zeros(0, bool)
+        self.stats, self.lists = evidence.explain(
+            hypotheses_of(self.pool, models), self.pool.category, config.pixels.weights(),
+            lists=True)
+        self._penalty: Float64Array | None = None
+        self._energy: JointEnergy | None = None
 
-    def with_more(self, new):
-        """Take further Candidates into the pool; return self."""
-        if len(new) or self.lists is None:
-            stats, lists = self.evidence.explain(
-                hypotheses_of(new, self.models), new.category, weights_of(self.config), lists=True)
-            first = self.lists is None
-            self.stats = stats if first else np.concatenate([self.stats, stats])
-            self.lists = lists if first else self.lists.extended(lists)
-            self.pool = self.pool.extended(new)
-            self.mask = np.concatenate([self.mask, np.zeros(len(new), bool)])
-        return self
+    @property
+    def chosen(self) -> Candidates:
+        """Return the chosen candidates."""
+        return self.pool.take(self.mask)
 
-    def search(self, rng, late):
-        """Search from the current subset; return the SearchResult."""
-        self._weigh()
-        found = local_search(self.energy, rng, self.config, late)
+    @property
+    def energy(self) -> JointEnergy:
+        """Return the JointEnergy of the pool as it is, at the current subset."""
+        if self._energy is None or self._energy.n != len(self.pool):
+            self._energy = self._build_energy()
+        return self._energy
+
+    def add(self, new: Candidates) -> None:
+        """Add Candidates to the pool; none of them is chosen yet."""
+        if not len(new):
+            return
+        stats, lists = self.evidence.explain(hypotheses_of(new, self.models), new.category,
+                                             self.config.pixels.weights(), lists=True)
+        first = not len(self.pool)
+        self.stats = stats if first else np.concatenate([self.stats, stats])
+        self.lists = lists if first else self.lists.extended(lists)
+        self.pool = self.pool.extended(new)
+        self.mask = np.concatenate([self.mask, np.zeros(len(new), bool)])
+
+    def run(self, rng: np.random.Generator, late: Callable[[], bool]) -> SearchResult:
+        """Search from the current subset, which becomes the best that was found."""
+        self._energy = self._build_energy()
+        found = local_search(self._energy, rng, self.config.search, late)
         self.mask = found.mask
         return found
 
-    def polished(self, steps, rng, turned=False):
+    def refined_copies(self, steps: int, rng: np.random.Generator, turned: bool = False,
+                       ) -> Candidates:
         """
-        Return refined copies of the chosen; both stay, the search decides which fit.
+        Return refined copies of the chosen candidates; the search decides between both.
 
         :param turned: start them half a turn away, about each axis where that is visible: no
-            step of a refinement is so long.
+            refinement takes such a long step.
         """
         chosen = np.flatnonzero(self.mask)
         start, context = self.pool.take(chosen), self.evidence.compose(chosen, self.lists)
@@ -86,39 +127,30 @@ class Search:
             chosen = chosen[row]
         if not len(chosen) or not steps:
             return Candidates.empty()
-        H = self._refined(hypotheses_of(start, self.models), start.category, chosen, context,
-                          steps, rng)
-        return candidates_of(H, start.category, start.score, self.models)
+        return self._refined(start, chosen, context, steps, rng)
 
-    def merged(self, steps, rng):
-        """Let one object take the place of two of its kind where that costs less; return self."""
+    def merge_pairs(self, rng: np.random.Generator) -> None:
+        """Replace two chosen objects of one category by one where that costs less."""
+        steps = self.config.polish_steps
         chosen = np.flatnonzero(self.mask)
         start, pairs = merged_pairs(self.pool.take(chosen), self.models)
         if not len(start) or not steps:
-            return self
-        H = hypotheses_of(start, self.models)
+            return
+        merged = Candidates.empty()
         for k, pair in enumerate(chosen[pairs]):
             others = self.evidence.compose(np.setdiff1d(chosen, pair), self.lists)
-            H[k] = self._refined(H[k:k + 1], start.category[k:k + 1], [-1], others, steps, rng)[0]
+            merged = merged.extended(self._refined(start.take([k]), [-1], others, steps, rng))
         first = len(self.pool)
-        self.with_more(candidates_of(H, start.category, start.score, self.models))
-        energy = self.weighed()
+        self.add(merged)
         for k, pair in enumerate(chosen[pairs]):
             mask = self.mask.copy()
             mask[pair], mask[first + k] = False, True
-            if self.mask[pair].all() and energy.evaluate(mask) < energy.value:
+            if self.mask[pair].all() and self.energy.evaluate(mask) < self.energy.value:
                 self.mask = mask
-                energy.reset(mask)
-        return self
+                self.energy.reset(mask)
 
-    def _refined(self, hypotheses, category, me, context, steps, rng):
-        """Return hypotheses (m, 10), each refined in its context; see Evidence.polish."""
-        c = self.config
-        return self.evidence.polish(hypotheses, category, me, context, weights_of(c), c.complexity,
-                                    c.size_prior, steps, (0.005, 0.06, 0.04), rng)
-
-    def in_the_running(self, most):
-        """Return (n,) bool: the chosen and the `most` a category that would cost least to add."""
+    def shortlist(self, most: int) -> BoolArray:
+        """Return (n,) bool: the chosen and, per category, the `most` cheapest to add."""
         keep = self.mask.copy()
         costs = self.energy.joining_costs()
         for c in np.unique(self.pool.category):
@@ -126,49 +158,47 @@ class Search:
             keep[mine[np.argsort(costs[mine], kind='stable')[:most]]] = True
         return keep
 
-    def take(self, rows):
-        """Return the same search with only some rows (n,) bool."""
+    def subset(self, rows: BoolArray) -> 'Search':
+        """Return a new search with only some rows (n,) bool of the pool."""
         other = Search(self.evidence, self.models, self.config, self.max_instances)
         other.pool, other.mask, other.stats = (
             self.pool.take(rows), self.mask[rows], self.stats[rows])
         other.lists = self.lists.take(np.flatnonzero(rows))
         return other
 
-    def on(self, evidence, rows):
-        """Return the same search on another resolution, with only some rows (n,) bool."""
+    def at_resolution(self, evidence: Evidence, rows: BoolArray) -> 'Search':
+        """Return a new search on other pixels, with only some rows (n,) bool of the pool."""
         other = Search(evidence, self.models, self.config, self.max_instances)
-        other.with_more(self.pool.take(rows))
+        other.add(self.pool.take(rows))
         other.mask = self.mask[rows]
         return other
 
-    def judged(self, probability):
-        """Let the odds of each candidate (n,) weigh in its cost; return self."""
+    def weigh_verdict(self, probability: Float64Array) -> None:
+        """Let the verifier's probability (n,) of each candidate count in its cost."""
+        verdict = self.config.verdict
         p = np.clip(probability, 0.02, 0.98)
-        c = self.config
-        self.odds = -c.verify_weight * (np.log(p / (1 - p)) + np.log(c.missing_against_false))
+        penalty = -verdict.verify_weight * (np.log(p / (1 - p))
+                                            + np.log(verdict.missing_against_false))
         if self.max_instances != 1:
-            # Two candidates for one thing are both probable; a limit of one would choose.
-            self.odds = np.maximum(self.odds, c.least_cost)
-        return self
+            # Two candidates for one object are both probable; a limit of one would choose.
+            penalty = np.maximum(penalty, verdict.least_cost)
+        self._penalty = penalty
 
-    def weighed(self):
-        """Return the JointEnergy of the pool as it is, at the current subset."""
-        if self.energy is None or self.energy.n != len(self.pool):
-            self._weigh()
-        return self.energy
-
-    def worth(self):
+    def marginal_energies(self) -> Float64Array:
         """Return (chosen,) how much the energy rises if an object is removed, in pixels."""
-        return self.weighed().deltas()[self.mask]
+        return self.energy.deltas()[self.mask]
 
-    def _weigh(self):
-        """Set up the energy of the pool as it is now, at the current subset."""
-        self.energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists, self.models,
-                                  self.config, self.max_instances, self.odds)
-        self.energy.reset(self.mask)
+    def _refined(self, start: Candidates, own: Sequence[int] | np.ndarray, context: Context,
+                 steps: int, rng: np.random.Generator) -> Candidates:
+        """Return `start`, each row refined in its context; see Evidence.polish."""
+        H = self.evidence.polish(
+            hypotheses_of(start, self.models), start.category, own, context,
+            self.config.pixels.weights(), self.config.objects.complexity,
+            self.config.objects.size_prior, steps, STEPS, rng)
+        return candidates_of(H, start.category, start.score, self.models)
 
-
-def weights_of(config):
-    """Return the PixelWeights of a ParseConfig."""
-    return PixelWeights(config.tolerance_m, config.normal_weight, config.category_weight,
-                        config.free_weight)
+    def _build_energy(self) -> JointEnergy:
+        energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists, self.models,
+                             self.config.objects, self.max_instances, self._penalty)
+        energy.reset(self.mask)
+        return energy

@@ -1,28 +1,33 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-How far off an object of the answer may be, from what its pixels say of its pose and size.
+Uncertainty of pose and size of each object, from what its pixels tell.
 
-Least squares know it: pose and size are as sure as the pixels change while the object moves,
-over the residual that remains. A plate half hidden leaves its centre open, a box whose far
-side nobody sees its depth. What no pixel tells, that real objects differ from generic models,
-grows with the object. Then every half turn about the model's axes is refined: one that costs
-hardly more may be the true one. All of it was calibrated on synthetic scenes (docs/planners.md
-says how well it holds).
+Covariance as in least squares: pose and size are as certain as the pixels change while the
+object moves, relative to the remaining residual. A half-hidden plate leaves its centre open, a
+box its depth where the far side is out of sight. The difference between real objects and generic
+models, which no pixel tells, grows with the object. Then every half turn about the model's axes
+is refined: one that costs hardly more may be the true one. All of it was calibrated on synthetic
+scenes (docs/planners.md says how well it holds).
 """
 
-from hooc_perception.core.frame.evidence import hypotheses_of
+from collections.abc import Sequence
+
+from hooc_perception.core.arrays import Float32Array, Float64Array, Int64Array
+from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
+from hooc_perception.core.frame.evidence import Evidence, hypotheses_of
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.frame.kernels import compare as stat
-from hooc_perception.core.frame.workspace import workspace_of
-from hooc_perception.core.parsing.search import weights_of
+from hooc_perception.core.parsing.search import STEPS
 from hooc_perception.core.symmetry import half_turns, is_ball
+from hooc_perception.core.types import Candidates, GenericModel, ParsedScene
 import numpy as np
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 # How far an object is moved to see what its pixels say: a pixel of a Kinect covers 3 mm.
 STEP_M = 0.003
-POLISH_STEPS, POLISH_SIGMAS = 20, (0.005, 0.06, 0.04)
+POLISH_STEPS = 20
 # What is known without the images: metres, radians, log scale.
 PRIOR = (0.05, 0.5, 0.12)
 # Calibrated on three twins (27 scenes, 274 objects) other than those of the docs: 68 % of the
@@ -37,22 +42,23 @@ FLIP_EVEN, FLIP_WIDTH = 0.02, 0.012
 WITHIN = 0.68
 
 
-def pose_uncertainty(observation, probabilities, parsed, models, config, rng):
+def pose_uncertainty(frame: Frame, parsed: ParsedScene, pixels: PixelCosts,
+                     costs: ObjectCosts, rng: np.random.Generator) -> Float32Array:
     """
     Return (sigma_t (n,), sigma_r (n,)) float32 of the objects of a ParsedScene.
 
     sigma_t, metres: 68 % of the centres lie within it of the true one. sigma_r, radians: the
     same of the rotation up to the model's symmetry; pi where a half turn is so likely that less
-    would not do; NaN for a ball. Both take the category for granted.
+    would not do; NaN for a ball. Both assume that the category is right.
 
-    :param config: ParseConfig, whose costs are used.
+    :param pixels: of the energy, like `costs`.
     """
     objects = parsed.objects
     n = len(objects)
     if not n:
         return np.zeros((2, 0), np.float32)
-    space = workspace_of(observation, probabilities, models)
-    cost = _Cost(space.coarse, objects, models, config)
+    models = frame.models
+    cost = _Cost(frame.coarse, objects, models, pixels, costs)
     longest = np.array([models[c - 1].longest_side for c in objects.category])
     information = _information(cost, longest)
     flipped = _flip_probabilities(cost, objects, models, rng)
@@ -85,36 +91,37 @@ def pose_uncertainty(observation, probabilities, parsed, models, config, rng):
 class _Cost:
     """The cost of the scene with one object posed and sized otherwise."""
 
-    def __init__(self, evidence, objects, models, config):
-        """Compose the answer."""
-        self.evidence, self.config = evidence, config
-        self.weights = weights_of(config)
+    def __init__(self, evidence: Evidence, objects: Candidates, models: Sequence[GenericModel],
+                 pixels: PixelCosts, costs: ObjectCosts) -> None:
+        """Compose the objects."""
+        self.evidence, self.costs = evidence, costs
+        self.weights = pixels.weights()
         self.H = hypotheses_of(objects, models)
         self.category = objects.category.astype(np.int64)
         _, lists = evidence.explain(self.H, self.category, self.weights, lists=True)
         self.context = evidence.compose(np.arange(len(objects)), lists)
 
-    def of(self, H, own):
+    def of(self, H: Float64Array, own: Int64Array) -> tuple[Float64Array, Float64Array]:
         """Return (m,) costs in pixels of the full images, and (m,) pixels that are shown."""
         stats = self.evidence.explain(H, self.category[own], self.weights, self.context, me=own)
-        prior = self.config.size_prior * (np.log(H[:, 7:10]) ** 2).sum(1)
+        prior = self.costs.size_prior * (np.log(H[:, 7:10]) ** 2).sum(1)
         shown = stats[:, stat.SHOWN] / self.evidence.scale
         return (stats[:, stat.DELTA] / self.evidence.scale
-                + shown * (self.config.complexity + prior)), shown
+                + shown * (self.costs.complexity + prior)), shown
 
-    def polished(self, H, own, rng):
+    def refined(self, H: Float64Array, own: Int64Array, rng: np.random.Generator) -> Float64Array:
         """Return hypotheses refined for some steps, each in place of its object."""
-        c = self.config
+        c = self.costs
         return self.evidence.polish(H, self.category[own], own, self.context, self.weights,
-                                    c.complexity, c.size_prior, POLISH_STEPS, POLISH_SIGMAS, rng)
+                                    c.complexity, c.size_prior, POLISH_STEPS, STEPS, rng)
 
 
-def _wider(p_flip):
+def _wider(p_flip: float) -> float:
     """Return the factor that makes WITHIN of all errors out of WITHIN of those without a flip."""
     return np.sqrt(chi2.ppf(WITHIN / (1 - p_flip), 3) / chi2.ppf(WITHIN, 3))
 
 
-def _information(cost, longest):
+def _information(cost: _Cost, longest: Float64Array) -> Float64Array:
     """
     Return (n, 9, 9), what the pixels say of pose and size: the sum of J J', in 1 / square metres.
 
@@ -146,12 +153,13 @@ def _information(cost, longest):
     return out
 
 
-def _flip_probabilities(cost, objects, models, rng):
+def _flip_probabilities(cost: _Cost, objects: Candidates, models: Sequence[GenericModel],
+                        rng: np.random.Generator) -> Float64Array:
     """Return (n,) how likely a half turn of the answer is the true orientation."""
     turned, rows = half_turns(objects, models)
     H = np.concatenate([cost.H, hypotheses_of(turned, models)])
     own = np.concatenate([np.arange(len(objects)), rows])
-    costs, shown = cost.of(cost.polished(H, own, rng), own)
+    costs, shown = cost.of(cost.refined(H, own, rng), own)
     out, n = np.zeros(len(objects)), len(objects)
     for k in range(n):
         others = np.flatnonzero(own[n:] == k) + n

@@ -1,13 +1,18 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""What was measured above the table and no object of the answer accounts for."""
+"""Measured points above the support plane that no object explains."""
 
+from collections.abc import Sequence
+
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import back_project, posed_vertices
 from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import Candidates, GenericModel, Observation
 import numpy as np
 
 
-def unexplained_points(observation, objects, models, tolerance_m=0.02):
+def unexplained_points(observation: Observation, objects: Candidates,
+                       models: Sequence[GenericModel], tolerance_m: float = 0.02) -> Float64Array:
     """
     Return (n, 3) float64 world points of the foreground that the objects do not explain.
 

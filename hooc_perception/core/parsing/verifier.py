@@ -1,18 +1,30 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Stage 4, last step: whether each candidate is what it says it is.
+Stage 4, last step: the probability that each candidate is right.
 
 The joint energy compares explanations of a scene; it does not know that a fork is seldom seen
-well or that a can is often taken for a glass. A small forest, learned from parsed synthetic
+well or that a can is often mistaken for a glass. A small forest, learned from parsed synthetic
 scenes alone (training/fit_verifier.py), gives every candidate in the running the probability
-that it is right, from how it fits, what the classifier says, and what the energy would pay for
-doing without it.
+that it is right, from how well it fits, what the classifier says, and its marginal energy.
 """
 
+from collections.abc import Mapping, Sequence
+
+from hooc_perception.core.arrays import (
+    AnyArray,
+    BoolArray,
+    Float32Array,
+    Float64Array,
+    UInt16Array,
+)
 from hooc_perception.core.classification.forest import Forest
+from hooc_perception.core.energy.joint import JointEnergy
+from hooc_perception.core.frame.evidence import Evidence, PixelLists
 from hooc_perception.core.frame.kernels import compare as kernel
 from hooc_perception.core.frame.kernels.pixel_lists import opinions
+from hooc_perception.core.parsing.search import Search
+from hooc_perception.core.types import Candidates, GenericModel
 from hooc_perception.errors import HoocError
 import numpy as np
 
@@ -30,12 +42,12 @@ class Verifier:
     :param forest: Forest over FEATURES with two classes, wrong and right.
     """
 
-    def __init__(self, forest):
+    def __init__(self, forest: Forest) -> None:
         """Wrap a forest."""
         self.forest = forest
 
     @staticmethod
-    def from_arrays(classifier):
+    def from_arrays(classifier: Mapping[str, AnyArray]) -> 'Verifier | None':
         """
         Return the Verifier of a classifier's arrays, None where training made none.
 
@@ -49,18 +61,18 @@ class Verifier:
             raise HoocError('the verifier of the model does not fit this version; train again')
         return Verifier(forest)
 
-    def probability(self, x):
+    def probability(self, x: Float32Array) -> Float64Array:
         """Return (n,) float64 for feature rows x (n, FEATURES) float32."""
         return self.forest.predict(x)[:, 1].astype(np.float64)
 
 
-def margins(energy, siblings):
+def margins(energy: JointEnergy, siblings: BoolArray) -> Float64Array:
     """
-    Return (n,) float64: what the thing that each candidate stands for is worth, in pixels.
+    Return (n,) float64: the marginal energy of the object behind each candidate, in pixels.
 
     Least energy with the candidate minus least energy without it and without its siblings,
-    other candidates for the same thing. One exchange may make up for the change, which is what
-    a local optimum leaves to gain. Negative: the scene is explained worse without that thing.
+    other candidates for the same object. One exchange may make up for the change, which is what
+    a local optimum leaves to gain. Negative: the scene is explained worse without that object.
 
     :param energy: JointEnergy at its optimum; it is left there.
     :param siblings: (n, n) bool, symmetric, True on the diagonal.
@@ -81,29 +93,25 @@ def margins(energy, siblings):
     return joining - np.where(np.isfinite(without), without, 0.0)
 
 
-def siblings_of(pool, models):
+def siblings_of(pool: Candidates, models: Sequence[GenericModel]) -> BoolArray:
     """Return (n, n) bool: same category, centres within 0.35 of the model's longest side."""
     reach = 0.35 * np.array([models[c - 1].longest_side for c in pool.category])
     apart = np.linalg.norm(pool.translation[:, None] - pool.translation[None], axis=2)
     return (pool.category[:, None] == pool.category[None]) & (apart < reach[:, None])
 
 
-def features(evidence, pool, stats, lists, models, energy):
-    """
-    Return (n, FEATURES) float32 of all candidates of a pool.
-
-    :param stats: (n, STATS) of the pool alone in the images, `lists` its PixelLists.
-    :param energy: JointEnergy of the pool at its optimum.
-    """
+def features(search: Search) -> Float32Array:
+    """Return (n, FEATURES) float32 of all candidates in the pool of a search at its optimum."""
+    evidence, pool, stats, models = search.evidence, search.pool, search.stats, search.models
     n = len(pool)
     if not n:
         return np.zeros((0, len(FEATURES)), np.float32)
-    margin = margins(energy, siblings_of(pool, models)) / evidence.scale
+    margin = margins(search.energy, siblings_of(pool, models)) / evidence.scale
     shown = np.maximum(stats[:, kernel.SHOWN], 1)
     agree = np.maximum(stats[:, kernel.AGREE], 1)
     extents = np.array([models[c - 1].extents for c in pool.category])
     scale = np.log(pool.size / np.maximum(extents, 1e-9))
-    p, foreground = _opinions(evidence, lists, n)
+    p, foreground = _opinions(evidence, search.lists, n)
     own = p[np.arange(n), pool.category]
     rest = p[:, 1:].copy()
     rest[np.arange(n), pool.category.astype(int) - 1] = 0
@@ -125,7 +133,7 @@ def features(evidence, pool, stats, lists, models, energy):
     return np.column_stack(columns).astype(np.float32)
 
 
-def _category_margin(margin, category):
+def _category_margin(margin: Float64Array, category: UInt16Array) -> Float64Array:
     """Return (n,) each candidate's log-like distance to the best other one of its category."""
     out = np.zeros(len(margin))
     for c in np.unique(category):
@@ -138,7 +146,8 @@ def _category_margin(margin, category):
     return np.sign(out) * np.log1p(np.abs(out) / 10)
 
 
-def _opinions(evidence, lists, n):
+def _opinions(evidence: Evidence, lists: PixelLists, n: int,
+              ) -> tuple[Float64Array, Float64Array]:
     """Return ((n, N + 1) mean class probabilities, (n,) share of foreground) of the pixels."""
     p, front = np.zeros((n, evidence.p.shape[1])), np.zeros(n)
     opinions(lists.offsets, lists.pixel, evidence.p_row, evidence.p, evidence.foreground, p,

@@ -2,9 +2,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read and write results files, format `hooc-results/1` (docs/scene_sets.md)."""
 
+from collections.abc import Mapping, Sequence
 import json
 import math
+from typing import Any
 
+from hooc_perception.core.types import ParsedScene
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import files
 import numpy as np
@@ -13,19 +16,34 @@ FORMAT = 'hooc-results/1'
 _TERMS = ('total', 'depth', 'probability', 'overlap')
 
 
-def scene_result(name, parsed, category_names, seconds, **extra):
+def scene_result(name: str, parsed: ParsedScene, category_names: Sequence[str], seconds: float,
+                 **extra: Any) -> dict[str, Any]:
+    """Return the dict of one scene in a results file, see `scene_entry` and `parsed_entry`."""
+    return scene_entry(name, parsed_entry(parsed, category_names), seconds, **extra)
+
+
+def scene_entry(name: str, entry: Mapping[str, Any], seconds: float, **extra: Any,
+                ) -> dict[str, Any]:
     """
     Return the dict of one scene in a results file.
 
-    :param parsed: ParsedScene.
-    :param category_names: names of the class ids 1..N.
-    :param seconds: from the last depth image's arrival to the answer.
+    :param entry: as `parsed_entry` or `Scene.to_dict` return it.
+    :param seconds: from the last depth image's arrival to the result.
     :param extra: more entries of this scene, such as `world` of a RecordedScene or a seed.
+    """
+    return {'scene': name, 'seconds': float(seconds), **entry, **extra}
+
+
+def parsed_entry(parsed: ParsedScene, category_names: Sequence[str]) -> dict[str, Any]:
+    """
+    Return energy and objects of a ParsedScene as plain numbers and lists.
+
+    :param category_names: names of the class ids 1..N.
     """
     energy = {term: _finite(getattr(parsed.energy, term)) for term in _TERMS}
     found = parsed.objects
-    sigmas = {name: getattr(parsed, name) for name in ('sigma_t', 'sigma_r')
-              if getattr(parsed, name, None) is not None}
+    sigmas = {name: sigma for name, sigma in (('sigma_t', parsed.sigma_t),
+                                              ('sigma_r', parsed.sigma_r)) if sigma is not None}
     objects = []
     for i in range(len(found)):
         objects.append({
@@ -39,9 +57,8 @@ def scene_result(name, parsed, category_names, seconds, **extra):
             'energy_delta': _finite(parsed.energy_delta[i]),
             'n_views': int(parsed.n_views[i]),
             **{name: _finite(sigma[i]) for name, sigma in sigmas.items()}})
-    return {'scene': name, 'seconds': float(seconds), 'energy': energy, 'objects': objects,
-            'converged': bool(parsed.converged),
-            'stage_seconds': {stage: float(s) for stage, s in parsed.seconds.items()}, **extra}
+    return {'energy': energy, 'objects': objects, 'converged': bool(parsed.converged),
+            'stage_seconds': {stage: float(s) for stage, s in parsed.seconds.items()}}
 
 
 def write_results(path, dataset, scenes, **extra):

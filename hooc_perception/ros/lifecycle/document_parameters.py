@@ -28,16 +28,20 @@ def table(config, section='', profiles=None):
     :param section: prefix of the names, such as `parse`.
     :param profiles: {profile: Config} whose values differ, or None.
     """
-    columns = profiles or {'default': config}
+    columns = {name: c.values() for name, c in (profiles or {'default': config}).items()}
     lines = ['| parameter | ' + ' | '.join(columns) + ' | range | meaning |',
              '|---|' + '---|' * len(columns) + '---|---|']
     common = {f.name for f in fields(StageConfig)} if type(config) is not StageConfig else set()
-    for f in fields(config):
+    declared = config.parameters()
+    for other in (profiles or {}).values():
+        declared |= other.parameters()
+    for f in declared.values():
         if f.name in common and not section:
             continue    # listed once for all nodes
         m = f.metadata
         name = f'{section}.{f.name}' if section else f.name
-        values = ' | '.join(_value(getattr(c, f.name)) for c in columns.values())
+        # A method that has no such parameter rejects it.
+        values = ' | '.join(_value(c[f.name]) if f.name in c else '-' for c in columns.values())
         change = ' *Changes while running.*' if m['runtime'] else (
             ' *Read-only.*' if m.get('read_only') else '')
         lines.append(f'| `{name}` | {values} | {_range(m)} | {m["doc"]}{change} |')
@@ -52,7 +56,7 @@ def documented(text):
         profiles = None
         if stage:
             from hooc_perception.core.profiles import profile
-            profiles = {p: getattr(profile(p), stage) for p in PROFILES}
+            profiles = {p: profile(p).stage(stage) for p in PROFILES}
         return f'{start}{table(config, stage or "", profiles)}{end}'
     return _BLOCK.sub(fill, text)
 

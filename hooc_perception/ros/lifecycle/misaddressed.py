@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parameters that a file or a command line sets and nobody takes: typing errors, mostly."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 import difflib
 import importlib
 
-from hooc_perception.chain import NODES, STAGES
+from hooc_perception.chain import NODES, PROFILES, STAGES
+from hooc_perception.core.config import Config
+from hooc_perception.core.profiles import profile
 
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 
@@ -27,9 +30,26 @@ def misaddressed(given, declared):
     return [_sentence(name, elsewhere, declared) for name in unknown if name not in elsewhere]
 
 
+def inert(given: Iterable[str], stages: Mapping[str, Config]) -> list[str]:
+    """
+    Return one sentence for each given parameter that only another profile's method has.
+
+    :param given: names that files and the command line set for a node.
+    :param stages: {stage: Config} that the node has declared.
+    """
+    wrong = []
+    for name in sorted(given):
+        stage, _, parameter = name.partition('.')
+        if stage in stages and parameter not in stages[stage].parameters():
+            wrong += [f'parameter {name} has no effect here: only the method of profile {other} '
+                      'has it; leave it out or set the parameter profile'
+                      for other in PROFILES
+                      if parameter in profile(other).stage(stage).parameters()][:1]
+    return wrong
+
+
 def known_elsewhere():
     """Return the names of all parameters of all nodes, extrinsics and QoS aside."""
-    from hooc_perception.core.profiles import profile
     names = set()
     for node in NODES:
         # By name, for this layer lies below the nodes; and only where something is wrong.
@@ -37,9 +57,9 @@ def known_elsewhere():
         for config in vars(module).values():
             if isinstance(config, type) and config.__name__.endswith('Config'):
                 names |= {f.name for f in fields(config)}
-    chosen = profile('best')
-    for stage in STAGES:
-        names |= {f'{stage}.{f.name}' for f in fields(getattr(chosen, stage))}
+    for name in PROFILES:
+        for stage in STAGES:
+            names |= {f'{stage}.{p}' for p in profile(name).stage(stage).parameters()}
     return names
 
 

@@ -7,7 +7,7 @@ A field `f` of section `parse` becomes the parameter `parse.f`; a node's own fie
 prefix. Values that a Config refuses are refused with its sentence as the reason.
 """
 
-from dataclasses import field, fields, replace
+from dataclasses import field
 import sys
 
 from hooc_perception.core.config import param
@@ -80,9 +80,10 @@ class Parameters:
         :raises HoocError: where such an override is refused, naming the parameter.
         """
         values = {}
-        for f in fields(config):
+        defaults = config.values()
+        for f in config.parameters().values():
             name = f'{section}.{f.name}' if section else f.name
-            default = getattr(config, f.name)
+            default = defaults[f.name]
             default = list(default) if isinstance(default, tuple) else default
             try:
                 value = self._node.declare_parameter(name, default, descriptor(f)).value
@@ -103,9 +104,9 @@ class Parameters:
         for parameter in parameters:
             section, _, name = parameter.name.rpartition('.')
             # Unknown here: still being declared, or not one of ours (use_sim_time, QoS).
-            if section not in changed or name not in {f.name for f in fields(changed[section])}:
+            if section not in changed or name not in changed[section].parameters():
                 continue
-            f = next(f for f in fields(changed[section]) if f.name == name)
+            f = changed[section].parameters()[name]
             if not f.metadata['runtime'] and not self._is_unconfigured():
                 return SetParametersResult(successful=False, reason=(
                     f'{parameter.name} shapes what the node has already built: deactivate and '
@@ -128,7 +129,7 @@ def _from_ros(value, f):
 def _checked(section, config, values):
     """Return `config` with `values`; its complaint names the section as well."""
     try:
-        return replace(config, **values)
+        return config.changed(values)
     except HoocError as error:
         text = str(error)
         raise HoocError(text.replace('parameter ', f'parameter {section}.', 1)

@@ -15,7 +15,7 @@ from hooc_perception.errors import HoocError
 from hooc_perception.ros.health.diagnostics import Diagnostics, WARN
 from hooc_perception.ros.health.downstream import wait_for_workers
 from hooc_perception.ros.lifecycle.memory import give_back_memory
-from hooc_perception.ros.lifecycle.misaddressed import misaddressed
+from hooc_perception.ros.lifecycle.misaddressed import inert, misaddressed
 from hooc_perception.ros.lifecycle.parameters import fixed_param, Parameters
 from hooc_perception.ros.lifecycle.spin import raise_interrupt
 from hooc_perception.ros.lifecycle.tolerant import TolerantLifecycleNode
@@ -69,6 +69,7 @@ class StageNode(TolerantLifecycleNode):
         self._mine = []
         self._topics = {}           # what is published -> its row in the table of topics
         self._before = set(vars(self)) | {'parameters', 'diagnostics'}
+        self.stages = tuple(stages)
         self.parameters = Parameters(self, self.is_unconfigured)
         self.diagnostics = Diagnostics(self)
         self.parameters.declare('', config)
@@ -102,7 +103,7 @@ class StageNode(TolerantLifecycleNode):
             except (OSError, ValueError, AttributeError):
                 pass    # configuring says what is wrong with the model
         chosen = profile(name if name in PROFILES else 'best')
-        return {stage: getattr(chosen, stage) for stage in stages}
+        return {stage: chosen.stage(stage) for stage in stages}
 
     # Endpoints, made while configuring and destroyed by cleaning up.
 
@@ -175,6 +176,7 @@ class StageNode(TolerantLifecycleNode):
         self._before = set(vars(self))
 
         def build():
+            self._reject_inert()
             self.configure()
             LifecycleNode.on_configure(self, state)
         if self._attempt('configure', build):
@@ -252,6 +254,13 @@ class StageNode(TolerantLifecycleNode):
             self.diagnostics.failed(f'{what}_failed',
                                     f'unexpected {type(error).__name__}: {error}')
         return False
+
+    def _reject_inert(self):
+        """Raise HoocError where a parameter was given that the profile's method does not have."""
+        wrong = inert(self._parameter_overrides, {stage: self.parameters[stage]
+                                                  for stage in self.stages})
+        if wrong:
+            raise HoocError('; '.join(wrong))
 
     def _report_misaddressed(self):
         """Say which parameters were given and are taken by nobody."""

@@ -6,23 +6,21 @@ from types import SimpleNamespace
 
 from hooc_perception.core.energy.joint import JointEnergy
 from hooc_perception.core.energy.overlap import union_shares
+from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
 from hooc_perception.core.frame.evidence import hypotheses_of
 from hooc_perception.core.frame.kernels import compare as stat
-from hooc_perception.core.frame.workspace import workspace_of
-from hooc_perception.core.parsing.parse import ParseConfig
-from hooc_perception.core.parsing.search import weights_of
 from hooc_perception.core.types import Candidates
 import numpy as np
 import pytest
 
-CONFIG = ParseConfig()
+CONFIG = ObjectCosts()
 
 
 def energy_of_pool(desk, pool, config=CONFIG, max_instances=0):
     """Return (JointEnergy over all pixels, stats, lists, evidence)."""
-    evidence = workspace_of(desk.observation, desk.probabilities, desk.models).evidence
+    evidence = desk.frame.evidence
     stats, lists = evidence.explain(hypotheses_of(pool, desk.models), pool.category,
-                                    weights_of(config), lists=True)
+                                    PixelCosts().weights(), lists=True)
     return (JointEnergy(evidence, pool, stats, lists, desk.models, config, max_instances), stats,
             lists, evidence)
 
@@ -104,7 +102,7 @@ def test_the_truth_costs_least(setting):
 
 def test_two_in_one_place_pay_for_their_overlap(desk):
     twice = desk.truth.take([0, 0])
-    free, paid = (energy_of_pool(desk, twice, ParseConfig(overlap=w))[0] for w in (0.0, 300.0))
+    free, paid = (energy_of_pool(desk, twice, ObjectCosts(overlap=w))[0] for w in (0.0, 300.0))
     both = np.ones(2, bool)
     assert paid.evaluate(both) - free.evaluate(both) == pytest.approx(600, rel=0.02)
     one = np.array([True, False])

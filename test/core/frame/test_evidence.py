@@ -4,7 +4,6 @@
 
 from hooc_perception.core.frame.evidence import hypotheses_of, PixelLists, PixelWeights
 from hooc_perception.core.frame.kernels import compare as stat
-from hooc_perception.core.frame.workspace import workspace_of
 from hooc_perception.core.hypotheses.propose import candidates_of
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Candidates
@@ -16,8 +15,8 @@ WEIGHTS = PixelWeights()
 
 @pytest.fixture(scope='module')
 def space(desk):
-    """Return the desk's Workspace."""
-    return workspace_of(desk.observation, desk.probabilities, desk.models)
+    """Return the desk's Frame."""
+    return desk.frame
 
 
 def test_views_are_laid_out_one_after_the_other(desk, space):

@@ -7,7 +7,6 @@ from types import SimpleNamespace
 
 from hooc_perception.core.frame.evidence import hypotheses_of, PixelLists, PixelWeights
 from hooc_perception.core.frame.kernels import compare as kernel
-from hooc_perception.core.frame.workspace import workspace_of
 from hooc_perception.core.geometry import posed_vertices
 from hooc_perception.core.render import render_depth, render_patch
 import numba
@@ -21,7 +20,7 @@ WEIGHTS = PixelWeights()
 @pytest.fixture(scope='module')
 def scene(desk):
     """Return the desk, its full Evidence, and 18 hypotheses: true, near, far, of other classes."""
-    evidence = workspace_of(desk.observation, desk.probabilities, desk.models).evidence
+    evidence = desk.frame.evidence
     rng, rows, category = np.random.default_rng(4), [], []
     true = hypotheses_of(desk.truth, desk.models)
     for k in range(18):

@@ -4,7 +4,6 @@
 
 from types import SimpleNamespace
 
-from hooc_perception.core.frame.workspace import workspace_of
 from hooc_perception.core.hypotheses.kernels import hypotheses as kernel
 from hooc_perception.core.hypotheses.sampling import tables
 import numba
@@ -20,7 +19,7 @@ NO_PULL = np.empty((0, 0))
 @pytest.fixture(scope='module')
 def ground(desk):
     """Return the desk's field, the models' tables and some good and bad hypotheses."""
-    space = workspace_of(desk.observation, desk.probabilities, desk.models)
+    space = desk.frame
     t, truth, rng = tables(desk.models), desk.truth, np.random.default_rng(5)
     rows, model_of = [], []
     for k in range(60):

@@ -4,6 +4,8 @@
 
 from dataclasses import replace
 
+from hooc_perception.core.frame.costs import PixelCosts
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.hypotheses.propose import propose, propose_more
 from hooc_perception.core.types import Candidates
@@ -14,8 +16,7 @@ import pytest
 
 def proposed(desk, config, seed=0):
     """Return the pool of a desk."""
-    return propose(desk.observation, desk.probabilities, desk.models, config,
-                   stage_rng(seed, 'propose'))
+    return propose(desk.frame, config, PixelCosts(), stage_rng(seed, 'propose'))
 
 
 def assert_same(a, b):
@@ -71,8 +72,8 @@ def test_the_same_seed_gives_the_same_pool_whatever_the_threads(desk, desk_pool,
 
 def test_an_empty_table_has_no_candidates(empty_desk, cheap):
     assert len(proposed(empty_desk, cheap)) == 0
-    more = propose_more(empty_desk.observation, empty_desk.probabilities, empty_desk.models,
-                        Candidates.empty(), cheap, stage_rng(0, 'propose', 1))
+    more = propose_more(empty_desk.frame, Candidates.empty(), cheap, PixelCosts(),
+                        stage_rng(0, 'propose', 1))
     assert len(more) == 0
 
 
@@ -81,14 +82,14 @@ def test_things_that_fit_nowhere_are_not_proposed(desk, cheap):
         name: getattr(desk.models[0], name) * 20 for name in
         ('vertices', 'extents', 'surface_points')})
     none = replace(desk.probabilities, p=np.ascontiguousarray(desk.probabilities.p[:, :2]))
-    pool = propose(desk.observation, none, (giant,), cheap, stage_rng(0, 'propose'))
+    pool = propose(Frame(desk.observation, none, (giant,)), cheap, PixelCosts(),
+                   stage_rng(0, 'propose'))
     assert len(pool) == 0
 
 
 def more_for(desk, objects, config, turn=1):
     """Return what is proposed further beside `objects`."""
-    return propose_more(desk.observation, desk.probabilities, desk.models, objects, config,
-                        stage_rng(0, 'propose', turn))
+    return propose_more(desk.frame, objects, config, PixelCosts(), stage_rng(0, 'propose', turn))
 
 
 def test_where_all_is_explained_nothing_good_is_offered(desk, cheap):
@@ -119,6 +120,8 @@ def test_rounds_draw_numbers_of_their_own(desk, cheap):
     assert len(first) != len(second) or (first.translation != second.translation).any()
 
 
-def test_the_papers_method_proposes_once(desk, cheap):
-    paper = replace(cheap, method='fragments')
-    assert len(more_for(desk, Candidates.empty(), paper)) == 0
+def test_pixel_costs_reach_the_ranking(desk, cheap):
+    """A tolerance in which everything fits makes all hypotheses alike to the images."""
+    loose = propose(desk.frame, cheap, PixelCosts(tolerance_m=0.5), stage_rng(0, 'propose'))
+    usual = proposed(desk, cheap)
+    assert len(loose) != len(usual) or (loose.score != usual.score).any()

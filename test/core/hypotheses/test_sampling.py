@@ -6,7 +6,6 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from hooc_perception.core.frame.kernels import compare as stat
-from hooc_perception.core.frame.workspace import workspace_of
 from hooc_perception.core.hypotheses.sampling import benefit, distinct, sample, tables
 import numba
 import numpy as np
@@ -17,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 @pytest.fixture(scope='module')
 def space(desk):
-    """Return the desk's Workspace."""
-    return workspace_of(desk.observation, desk.probabilities, desk.models)
+    """Return the desk's Frame."""
+    return desk.frame
 
 
 def drawn(space, desk, config, seed=0, steps=0, weight=None, samples=1500):

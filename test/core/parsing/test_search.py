@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Moves of the search that no refinement makes: one object for two, half turns, a small pool."""
 
-from hooc_perception.core.frame.workspace import workspace_of
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.hypotheses.merge import merged_pairs
-from hooc_perception.core.parsing.parse import ParseConfig
+from hooc_perception.core.parsing.config import ParseConfig
 from hooc_perception.core.parsing.search import Search, search_scene
 from hooc_perception.core.types import Candidates
 from hooc_perception.objects.derive import derive
@@ -40,9 +39,9 @@ def halves():
 
 def found(desk, pool, config=ParseConfig(), max_instances=0):
     """Return the chosen Candidates and all that were considered."""
-    state, _, considered = search_scene(desk.observation, desk.probabilities, pool, desk.models,
-                                        config, stage_rng(0, 'parse'), max_instances)
-    return state.pool.take(state.mask), considered
+    search, _, considered = search_scene(desk.frame, pool, config, stage_rng(0, 'parse'),
+                                         max_instances)
+    return search.chosen, considered
 
 
 def test_one_large_object_takes_the_place_of_two(long_box, halves):
@@ -104,14 +103,14 @@ def test_what_lies_the_wrong_way_round_is_turned(make_desk):
 
 
 def test_what_has_no_prospect_does_not_go_on_to_the_next_round(desk, desk_pool):
-    space = workspace_of(desk.observation, desk.probabilities, desk.models)
-    state = Search(space.coarse, desk.models, ParseConfig(), 1).with_more(desk_pool)
-    state.search(stage_rng(0, 'parse'), lambda: False)
-    value = state.energy.value
-    rows = state.in_the_running(1)
-    less = state.take(rows)
-    assert rows[state.mask].all() and len(less.pool) < len(desk_pool)
-    assert less.weighed().value == pytest.approx(value, abs=1e-6)
+    search = Search(desk.frame.coarse, desk.models, ParseConfig(), 1)
+    search.add(desk_pool)
+    search.run(stage_rng(0, 'parse'), lambda: False)
+    value = search.energy.value
+    rows = search.shortlist(1)
+    less = search.subset(rows)
+    assert rows[search.mask].all() and len(less.pool) < len(desk_pool)
+    assert less.energy.value == pytest.approx(value, abs=1e-6)
     np.testing.assert_array_equal(less.pool.translation, desk_pool.translation[rows])
     # All the same, all of them count as considered.
     _, considered = found(desk, desk_pool, ParseConfig(kept=1))

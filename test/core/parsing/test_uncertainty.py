@@ -4,17 +4,21 @@
 
 from dataclasses import replace
 
+from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.parsing.calibration import finished, pixel_areas, with_sigmas
-from hooc_perception.core.parsing.parse import ParseConfig
+from hooc_perception.core.methods.joint import JointMethod
+from hooc_perception.core.parsing.calibration import pixel_areas
 from hooc_perception.core.parsing.uncertainty import _wider, pose_uncertainty
+from hooc_perception.core.profiles import profile
 from hooc_perception.core.types import Candidates, Energy, ParsedScene
+from hooc_perception.parser import Parser
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-CONFIG = ParseConfig()
+COSTS = PixelCosts(), ObjectCosts()
 
 
 def answer(objects, residual_m=0.001, worth=1000.0):
@@ -26,9 +30,8 @@ def answer(objects, residual_m=0.001, worth=1000.0):
 
 def sigmas(desk, objects=None, **kwargs):
     """Return (sigma_t, sigma_r) of true objects on a desk."""
-    return pose_uncertainty(desk.observation, desk.probabilities,
-                            answer(desk.truth if objects is None else objects, **kwargs),
-                            desk.models, CONFIG, stage_rng(0, 'sigmas'))
+    return pose_uncertainty(desk.frame, answer(desk.truth if objects is None else objects,
+                                               **kwargs), *COSTS, stage_rng(0, 'sigmas'))
 
 
 def test_plain_objects_in_full_view_are_known_to_millimetres(desk):
@@ -54,7 +57,7 @@ def test_one_view_knows_less_than_three(desk, make_desk):
     mine = desk.probabilities.camera == 0
     p = replace(desk.probabilities, **{name: getattr(desk.probabilities, name)[mine]
                                        for name in ('camera', 'uv', 'p')})
-    alone = pose_uncertainty(one, p, answer(desk.truth), desk.models, CONFIG,
+    alone = pose_uncertainty(Frame(one, p, desk.models), answer(desk.truth), *COSTS,
                              stage_rng(0, 'sigmas'))
     known = sigmas(desk)
     assert (alone[0] > known[0]).all() and (alone[1] > 1.2 * known[1])[[0, 2]].all()
@@ -68,10 +71,9 @@ def test_a_half_turn_that_looks_the_same_is_told(make_desk, things):
                        np.array([[0, 0, 0, 1.0]]), np.float32([things[0].extents]),
                        np.ones(1, np.float32))
     desk = make_desk(truth)
-    turned = pose_uncertainty(desk.observation, desk.probabilities, answer(truth), plain, CONFIG,
-                              stage_rng(0, 'sigmas'))
-    known = pose_uncertainty(desk.observation, desk.probabilities, answer(truth), things, CONFIG,
-                             stage_rng(0, 'sigmas'))
+    turned, known = (
+        pose_uncertainty(Frame(desk.observation, desk.probabilities, models), answer(truth),
+                         *COSTS, stage_rng(0, 'sigmas')) for models in (plain, things))
     assert turned[1, 0] == pytest.approx(np.pi) and known[1, 0] < 0.2
 
 
@@ -85,27 +87,24 @@ def test_the_mixture_quantile():
 
 
 def test_nothing_and_scenes_without_anything(desk, empty_desk):
-    none = pose_uncertainty(desk.observation, desk.probabilities, answer(Candidates.empty()),
-                            desk.models, CONFIG, stage_rng(0, 'sigmas'))
+    none = sigmas(desk, Candidates.empty())
     assert none.shape == (2, 0)
     # An object where nobody measured anything: the prior is all that is known.
-    sigma_t, _ = pose_uncertainty(
-        empty_desk.observation, empty_desk.probabilities,
-        answer(desk.truth), desk.models, CONFIG, stage_rng(0, 'sigmas'))
+    sigma_t, _ = sigmas(empty_desk, desk.truth)
     assert np.isfinite(sigma_t).all()
 
 
 def test_scores_are_probabilities_of_what_an_object_is_worth(desk):
     scores = []
     for worth in (-5.0, 0.0, 10.0, 98.0, 1000.0, 1e5):
-        done = finished(answer(desk.truth, worth=worth), desk.observation, desk.models, CONFIG)
+        done = JointMethod().calibrate(desk.frame, answer(desk.truth, worth=worth))
         scores.append(done.objects.score)
     scores = np.array(scores)
     assert scores.dtype == np.float32 and (np.diff(scores[1:], axis=0) > 0).all()
     assert (scores >= 0).all() and (scores <= 1).all() and (scores[0] < 0.01).all()
-    # Pixels of the reference camera: what is worth 98 of them stands there half of the time.
-    area = pixel_areas(desk.truth, desk.observation)
-    even = finished(answer(desk.truth, worth=1.0), desk.observation, desk.models, CONFIG)
+    # Pixels of the reference camera: 98 of them mean that an object stands there half of the time.
+    area = pixel_areas(desk.truth, desk.observation.views)
+    even = JointMethod().calibrate(desk.frame, answer(desk.truth, worth=1.0))
     expected = 1 / (1 + np.exp(4.04 - 0.88 * np.log(area)))
     np.testing.assert_allclose(even.objects.score, expected, rtol=1e-5)
 
@@ -113,8 +112,8 @@ def test_scores_are_probabilities_of_what_an_object_is_worth(desk):
 def test_pixels_of_other_cameras_are_converted(desk):
     sharp = [replace(v, camera=replace(v.camera, K=v.camera.K * [[2], [2], [1]]))
              for v in desk.observation.views]
-    ratio = pixel_areas(desk.truth, desk.observation) / pixel_areas(
-        desk.truth, replace(desk.observation, views=tuple(sharp)))
+    ratio = (pixel_areas(desk.truth, desk.observation.views)
+             / pixel_areas(desk.truth, tuple(sharp)))
     np.testing.assert_allclose(ratio, 4)
 
 
@@ -122,15 +121,17 @@ def test_the_papers_scores_are_left_alone_and_orientations_are_not(desk):
     turns = Rotation.from_rotvec([[0, 0, np.pi], [0, 0, 0.9], [0, 0, 1.2]])
     turned = replace(desk.truth, rotation_xyzw=(
         Rotation.from_quat(desk.truth.rotation_xyzw) * turns).as_quat())
-    done = finished(answer(turned), desk.observation, desk.models,
-                    replace(CONFIG, search='genetic'))
+    paper = Parser(desk.models, {}, profile('paper'))
+    paper.method.parse = lambda *_: answer(turned)
+    done = paper.decide(desk.frame, turned)
     np.testing.assert_array_equal(done.objects.score, turned.score)
     angles = Rotation.from_quat(done.objects.rotation_xyzw).magnitude()
     np.testing.assert_allclose(angles, [0.4, 0, 0], atol=1e-6)
 
 
 def test_with_sigmas_fills_the_record(desk):
-    done = with_sigmas(answer(desk.truth), desk.observation, desk.probabilities, desk.models,
-                       CONFIG, stage_rng(0, 'sigmas'))
+    parser = Parser(desk.models, {}, sigmas=True)
+    parser.method.parse = lambda *_: answer(desk.truth)
+    done = parser.decide(desk.frame, desk.truth)
     np.testing.assert_array_equal(done.sigma_t, sigmas(desk)[0])
     assert answer(desk.truth).sigma_t is None

@@ -5,11 +5,12 @@
 from dataclasses import replace
 
 from hooc_perception.core.energy.joint import JointEnergy
+from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
 from hooc_perception.core.frame.evidence import hypotheses_of
-from hooc_perception.core.frame.workspace import workspace_of
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.parsing.parse import parse, ParseConfig
-from hooc_perception.core.parsing.search import search_scene, weights_of
+from hooc_perception.core.methods.joint import JointMethod
+from hooc_perception.core.parsing.config import ParseConfig
+from hooc_perception.core.parsing.search import Search, search_scene
 from hooc_perception.core.parsing.verifier import (
     FEATURES,
     features,
@@ -17,11 +18,19 @@ from hooc_perception.core.parsing.verifier import (
     siblings_of,
     Verifier,
 )
+from hooc_perception.core.types import Candidates
 from hooc_perception.errors import HoocError
 import numpy as np
 import pytest
 
 CONFIG = ParseConfig()
+
+
+class Alone(JointMethod):
+    """The joint method without re-proposal."""
+
+    def propose_more(self, frame, objects, turn, seed):
+        return Candidates.empty()
 
 
 class Says:
@@ -36,8 +45,7 @@ class Says:
 def state(desk, desk_pool):
     """Return the Search of the desk at its optimum; in its pool are things at others' places."""
     wrong = replace(desk.truth, category=np.roll(desk.truth.category, 1))
-    found, _, _ = search_scene(desk.observation, desk.probabilities,
-                               desk_pool.extended(wrong), desk.models, CONFIG,
+    found, _, _ = search_scene(desk.frame, desk_pool.extended(wrong), CONFIG,
                                stage_rng(0, 'parse'))
     return found
 
@@ -45,10 +53,10 @@ def state(desk, desk_pool):
 def test_margins_are_what_one_exchange_leaves_to_gain(desk):
     pool = desk.truth.extended(desk.truth)
     pool.translation[3:] += [0.015, 0.0, 0.0]
-    evidence = workspace_of(desk.observation, desk.probabilities, desk.models).coarse
+    evidence = desk.frame.coarse
     stats, lists = evidence.explain(hypotheses_of(pool, desk.models), pool.category,
-                                    weights_of(CONFIG), lists=True)
-    energy = JointEnergy(evidence, pool, stats, lists, desk.models, CONFIG, 1)
+                                    PixelCosts().weights(), lists=True)
+    energy = JointEnergy(evidence, pool, stats, lists, desk.models, ObjectCosts(), 1)
     start = np.array([True, True, False, False, False, False])
     energy.reset(start)
     siblings = siblings_of(pool, desk.models)
@@ -70,8 +78,7 @@ def test_margins_are_what_one_exchange_leaves_to_gain(desk):
 
 
 def test_features_tell_right_from_wrong(desk, state):
-    x = features(state.evidence, state.pool, state.stats, state.lists, desk.models,
-                 state.weighed())
+    x = features(state)
     assert x.shape == (len(state.pool), len(FEATURES)) and x.dtype == np.float32
     assert np.isfinite(x).all()
     column = dict(zip(FEATURES, x.T))
@@ -84,15 +91,14 @@ def test_features_tell_right_from_wrong(desk, state):
     assert column['agree'][right].mean() > column['agree'][~right].mean()
 
 
-def test_no_candidates_have_no_features(desk, empty_desk, desk_pool):
-    none = desk_pool.take(np.zeros(len(desk_pool), bool))
-    assert features(None, none, None, None, desk.models, None).shape == (0, len(FEATURES))
+def test_no_candidates_have_no_features(desk):
+    none = Search(desk.frame.coarse, desk.models, CONFIG, 0)
+    assert features(none).shape == (0, len(FEATURES))
 
 
 def test_its_probability_is_the_score_and_decides(desk, desk_pool):
     def run(verifier):
-        return parse(desk.observation, desk.probabilities, desk_pool, desk.models, CONFIG,
-                     stage_rng(0, 'parse'), 1, None, verifier)
+        return Alone(parse=CONFIG, verifier=verifier).parse(desk.frame, desk_pool, 0, 1)
 
     sure = run(Says(lambda x: np.full(len(x), 0.9)))
     assert sorted(sure.objects.category) == [1, 2, 3]

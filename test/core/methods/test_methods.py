@@ -5,19 +5,40 @@
 from dataclasses import replace
 
 from hooc_perception.core.energy.eq1 import energy_of
+from hooc_perception.core.frame.costs import PixelCosts
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.hypotheses.propose import propose, propose_more
-from hooc_perception.core.parsing.parse import parse, ParseConfig
+from hooc_perception.core.methods.genetic import GeneticConfig
+from hooc_perception.core.methods.joint import JointMethod
+from hooc_perception.core.methods.paper import PaperMethod, PaperParseConfig
+from hooc_perception.core.parsing.config import ParseConfig
 from hooc_perception.core.types import Candidates
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 
+class Joint(JointMethod):
+    """The joint method, with re-proposal by the test or not at all."""
+
+    def __init__(self, config, more=None):
+        super().__init__(parse=config)
+        self._more = more
+
+    def propose_more(self, frame, objects, turn, seed):
+        return self._more(objects, turn) if self._more else Candidates.empty()
+
+
 def parsed(desk, pool, config=ParseConfig(), max_instances=0, more=None, seed=0):
-    """Return the ParsedScene of a desk."""
-    return parse(desk.observation, desk.probabilities, pool, desk.models, config,
-                 stage_rng(seed, 'parse'), max_instances, more)
+    """Return the ParsedScene of a desk by the joint method."""
+    return Joint(config, more).parse(desk.frame, pool, seed, max_instances)
+
+
+def parsed_as_in_the_paper(desk, pool, iterations, max_instances=0, **config):
+    """Return the ParsedScene of a desk by the paper's method."""
+    config = PaperParseConfig(genetic=GeneticConfig(iterations=iterations), **config)
+    return PaperMethod(parse=config).parse(desk.frame, pool, 0, max_instances)
 
 
 def assert_found(scene, desk, within_m=0.008):
@@ -37,7 +58,7 @@ def assert_found(scene, desk, within_m=0.008):
 def answer(desk, desk_pool, cheap):
     """Return the ParsedScene of the desk from what was proposed, with re-proposal."""
     def more(objects, turn):
-        return propose_more(desk.observation, desk.probabilities, desk.models, objects, cheap,
+        return propose_more(desk.frame, objects, cheap, PixelCosts(),
                             stage_rng(0, 'propose', turn))
 
     return parsed(desk, desk_pool, more=more)
@@ -143,7 +164,7 @@ def test_what_is_missing_is_asked_for_and_found(desk, cheap):
 
     def more(objects, turn):
         asked.append((sorted(objects.category.tolist()), turn))
-        return propose_more(desk.observation, desk.probabilities, desk.models, objects, cheap,
+        return propose_more(desk.frame, objects, cheap, PixelCosts(),
                             stage_rng(0, 'propose', turn))
 
     scene = parsed(desk, desk.truth.take([0, 2]), ParseConfig(rounds=2), more=more)
@@ -155,12 +176,12 @@ def test_what_is_missing_is_asked_for_and_found(desk, cheap):
 
 @pytest.mark.parametrize('search', ['joint', 'genetic'])
 def test_a_deadline_ends_the_search_with_an_answer(desk, desk_pool, search):
-    config = ParseConfig(search=search, deadline_s=1e-6)
-    scene = parsed(desk, desk_pool, config)
+    scene = (parsed(desk, desk_pool, ParseConfig(deadline_s=1e-6)) if search == 'joint'
+             else parsed_as_in_the_paper(desk, desk_pool, 300, deadline_s=1e-6))
     assert not scene.converged
     assert len(scene.objects) == len(scene.n_views) <= len(desk_pool)
     assert np.isfinite(scene.energy.total)
-    assert parsed(desk, desk.truth, ParseConfig(search='joint', deadline_s=3600.0)).converged
+    assert parsed(desk, desk.truth, ParseConfig(deadline_s=3600.0)).converged
 
 
 def test_no_category_has_more_than_its_limit(things, make_desk):
@@ -174,13 +195,13 @@ def test_no_category_has_more_than_its_limit(things, make_desk):
     for limit, expected in ((0, [2, 2, 3]), (1, [2, 3]), (2, [2, 2, 3])):
         scene = parsed(desk, pool, max_instances=limit)
         assert sorted(scene.objects.category) == expected
-    genetic = parsed(desk, pool, ParseConfig(search='genetic', iterations=20), max_instances=1)
+    genetic = parsed_as_in_the_paper(desk, pool, 20, max_instances=1)
     assert np.bincount(genetic.objects.category).max() <= 1
 
 
 def test_the_papers_search_finds_them_from_the_true_poses(desk):
     pool = desk.truth.extended(replace(desk.truth, translation=desk.truth.translation + 0.2))
-    scene = parsed(desk, pool, ParseConfig(search='genetic', iterations=30))
+    scene = parsed_as_in_the_paper(desk, pool, 30)
     assert_found(scene, desk, 1e-6)
     assert scene.converged
     energy = energy_of(desk.observation, desk.probabilities, desk.truth, desk.models)
@@ -196,9 +217,18 @@ def test_the_same_seed_gives_the_same_answer(desk, desk_pool):
     assert a.energy == b.energy
 
 
-def test_proposing_and_parsing_see_the_same_workspace(desk, cheap):
+def test_proposing_and_parsing_leave_the_frame_as_it_is(desk, cheap):
     # Whoever proposes first must not change what parsing finds, and the other way round.
     first = parsed(desk, desk.truth, ParseConfig(rounds=1))
-    propose(desk.observation, desk.probabilities, desk.models, cheap, stage_rng(4, 'propose'))
+    propose(desk.frame, cheap, PixelCosts(), stage_rng(4, 'propose'))
     again = parsed(desk, desk.truth, ParseConfig(rounds=1))
     np.testing.assert_array_equal(first.objects.translation, again.objects.translation)
+
+
+def test_the_energies_are_of_the_frame_that_is_given(desk, empty_desk):
+    """No state is shared between frames: two of them taken in turns do not mix."""
+    other = Frame(desk.observation, desk.probabilities, desk.models)
+    a, nothing, b = (Joint(ParseConfig(rounds=0)).parse(frame, desk.truth, 0)
+                     for frame in (desk.frame, empty_desk.frame, other))
+    assert len(nothing.objects) == 0
+    np.testing.assert_array_equal(a.objects.translation, b.objects.translation)

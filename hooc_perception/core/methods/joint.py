@@ -1,0 +1,89 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The joint method: model-driven candidates, one energy for categories, poses and sizes."""
+
+from dataclasses import replace
+
+from hooc_perception.core.energy.local_search import SearchResult
+from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
+from hooc_perception.core.frame.frame import Frame
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.hypotheses.propose import propose, propose_more, ProposeConfig
+from hooc_perception.core.methods.protocol import Deadline
+from hooc_perception.core.parsing.answer import Choice, parsed_scene
+from hooc_perception.core.parsing.calibration import calibrated_scores
+from hooc_perception.core.parsing.config import ParseConfig
+from hooc_perception.core.parsing.search import Search, search_scene
+from hooc_perception.core.parsing.verifier import features, Verifier
+from hooc_perception.core.types import Candidates, ParsedScene
+import numpy as np
+
+
+class JointMethod:
+    """
+    Alternates a discrete search with refinement and re-proposal; a verifier has the last word.
+
+    :param propose: ProposeConfig of stage 3.
+    :param parse: ParseConfig of stage 4; its pixel costs rank the hypotheses, too.
+    :param verifier: of the model; None = the energy decides alone.
+    """
+
+    def __init__(self, propose: ProposeConfig = ProposeConfig(),
+                 parse: ParseConfig = ParseConfig(), verifier: Verifier | None = None) -> None:
+        self._propose, self._parse, self._verifier = propose, parse, verifier
+
+    @property
+    def pixels(self) -> PixelCosts:
+        """Return the pixel costs of the joint energy."""
+        return self._parse.pixels
+
+    @property
+    def objects(self) -> ObjectCosts:
+        """Return the object costs of the joint energy."""
+        return self._parse.objects
+
+    def propose(self, frame: Frame, seed: int) -> Candidates:
+        """Return candidates of every category, the best of each first."""
+        return propose(frame, self._propose, self.pixels, stage_rng(seed, 'propose'))
+
+    def propose_more(self, frame: Frame, objects: Candidates, turn: int, seed: int) -> Candidates:
+        """Return candidates for what `objects` leave unexplained in round `turn`, from 1."""
+        return propose_more(frame, objects, self._propose, self.pixels,
+                            stage_rng(seed, 'propose', turn))
+
+    def search(self, frame: Frame, pool: Candidates, seed: int, max_instances: int = 0) -> Search:
+        """Return the Search at its optimum, as it is before the verifier judges."""
+        return self._search(frame, pool, seed, max_instances, Deadline(0),
+                            stage_rng(seed, 'parse'))[0]
+
+    def parse(self, frame: Frame, pool: Candidates, seed: int, max_instances: int = 0,
+              ) -> ParsedScene:
+        """Search the scene, let the verifier judge the candidates, and decide."""
+        deadline, rng = Deadline(self._parse.deadline_s), stage_rng(seed, 'parse')
+        search, found, considered = self._search(frame, pool, seed, max_instances, deadline, rng)
+        probability = None
+        if self._verifies and self._verifier is not None and len(search.pool):
+            probability = self._verifier.probability(features(search))
+            search.weigh_verdict(probability)
+            found = search.run(rng, deadline.passed)
+        choice = Choice(search.pool, search.mask, search.marginal_energies(),
+                        found.converged and not deadline.passed(), considered, probability)
+        return parsed_scene(frame, choice, self.pixels).timed(parse=deadline.elapsed)
+
+    def calibrate(self, frame: Frame, parsed: ParsedScene) -> ParsedScene:
+        """Return the scene with scores from marginal energies, unless the verifier gave them."""
+        if self._verifies or not len(parsed.objects):
+            return parsed
+        score = calibrated_scores(parsed, frame.observation)
+        return replace(parsed, objects=replace(parsed.objects, score=score))
+
+    def _search(self, frame: Frame, pool: Candidates, seed: int, max_instances: int,
+                deadline: Deadline, rng: np.random.Generator,
+                ) -> tuple[Search, SearchResult, Candidates]:
+        return search_scene(
+            frame, pool, self._parse, rng, max_instances,
+            lambda objects, turn: self.propose_more(frame, objects, turn, seed), deadline.passed)
+
+    @property
+    def _verifies(self) -> bool:
+        return self._verifier is not None and self._parse.verdict.verify_weight > 0

@@ -1,0 +1,170 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The method in one screen: from depth images to the objects on the table.
+
+`Parser` is the only place that sequences the stages. Commands, nodes, training and evaluation
+call it, all at once (`parse`) or stage by stage.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from os import PathLike
+import time
+from typing import Any, TYPE_CHECKING, TypeVar
+
+from hooc_perception.core.arrays import AnyArray
+from hooc_perception.core.classification.classify import classify, KIND_PAPER
+from hooc_perception.core.frame.frame import Frame
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.parsing.uncertainty import pose_uncertainty
+from hooc_perception.core.parsing.verifier import Verifier
+from hooc_perception.core.profiles import Profile, with_overrides
+from hooc_perception.core.profiles import profile as profile_of
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.rectify import rectify
+from hooc_perception.core.symmetry import canonical_objects
+from hooc_perception.core.types import (
+    Candidates,
+    DepthView,
+    GenericModel,
+    Observation,
+    ParsedScene,
+    PixelProbabilities,
+    RectifiedView,
+)
+from hooc_perception.errors import HoocError
+from hooc_perception.scene import Scene, scene_of
+import numpy as np
+
+if TYPE_CHECKING:
+    from hooc_perception.trained.folder import ModelFolder
+
+T = TypeVar('T')
+
+
+class Parser:
+    """
+    Finds the objects of a model's categories in depth images.
+
+    :param models: generic models; class id c is models[c - 1].
+    :param classifier: arrays of the pixel classifier and the verifier, as training wrote them.
+    :param profile: the method and its parameters.
+    :param max_instances: most objects per category, 0 = no limit.
+    :param sigmas: whether to estimate the uncertainty of poses.
+    :raises HoocError: where the profile sets parameters that the classifier does not have.
+    """
+
+    def __init__(self, models: Sequence[GenericModel], classifier: Mapping[str, AnyArray],
+                 profile: Profile = Profile(), max_instances: int = 0,
+                 sigmas: bool = False) -> None:
+        self.models, self.classifier, self.profile = tuple(models), classifier, profile
+        self.max_instances, self.sigmas = max_instances, sigmas
+        self._verifier = Verifier.from_arrays(classifier)
+        self.method = profile.method(self._verifier)
+        _check_classify(classifier, profile)
+
+    @classmethod
+    def load(cls, model: 'str | PathLike[str] | ModelFolder', profile: str | None = None, *,
+             parameters: Mapping[str, Any] | None = None, max_instances: int | None = None,
+             sigmas: bool = True) -> 'Parser':
+        """
+        Return the Parser of a MODEL folder.
+
+        :param model: folder that `hooc train` wrote, or what `load_model_folder` returned.
+        :param profile: `paper`, `best` or `fast`; default the one that it was trained for.
+        :param parameters: {'stage.name': value}, changes to the profile (docs/nodes.md).
+        :param max_instances: most objects per category, 0 = no limit; default the model's.
+        :param sigmas: whether to estimate the uncertainty of poses, which takes longer.
+        :raises HoocError: a damaged model, an unknown profile, or a parameter that the profile
+            does not have.
+        """
+        from hooc_perception.trained.folder import load_model_folder, ModelFolder
+        folder = model if isinstance(model, ModelFolder) else load_model_folder(model)
+        chosen = with_overrides(profile_of(profile or folder.profile), parameters or {})
+        limit = folder.max_instances if max_instances is None else max_instances
+        return cls(folder.models, folder.classifier, chosen, limit, sigmas)
+
+    def changed(self, profile: Profile | None = None, sigmas: bool | None = None) -> 'Parser':
+        """Return a Parser of the same model with other settings; itself where nothing changes."""
+        profile = self.profile if profile is None else profile
+        sigmas = self.sigmas if sigmas is None else sigmas
+        if (profile, sigmas) == (self.profile, self.sigmas):
+            return self
+        return Parser(self.models, self.classifier, profile, self.max_instances, sigmas)
+
+    def parse(self, views: Sequence[DepthView], seed: int = 0,
+              change_pool: Callable[[Candidates], Candidates] | None = None) -> Scene:
+        """
+        Return the objects that one frame set shows.
+
+        :param views: one raw depth image per camera.
+        :param seed: the same seed and input give the same result, whatever the thread count.
+        :param change_pool: applied between stages 3 and 4, for experiments such as setting B of
+            the paper.
+        :raises HoocError: where the images cannot be used, with the reason.
+        """
+        lap = _Laps()
+        observation = lap('observe', self.observe(views))
+        probabilities = lap('classify', self.classify(observation))
+        frame = self.frame(observation, probabilities)
+        pool = lap('propose', self.propose(frame, seed))
+        if change_pool is not None:
+            pool = change_pool(pool)
+        parsed = self.decide(frame, pool, seed)
+        return scene_of(parsed.timed(**lap.seconds), observation, self.models)
+
+    def observe(self, views: Sequence[DepthView | RectifiedView]) -> Observation:
+        """Stage 1: rectify the views, level them on the support plane, find the foreground."""
+        config = self.profile.observe
+        return observe([rectify(view, config) if isinstance(view, DepthView) else view
+                        for view in views], config)
+
+    def classify(self, observation: Observation) -> PixelProbabilities:
+        """Stage 2: class probabilities of the foreground pixels."""
+        return classify(observation, self.classifier, self.profile.classify)
+
+    def frame(self, observation: Observation, probabilities: PixelProbabilities) -> Frame:
+        """Return what stages 3 and 4 take: observation, probabilities and models."""
+        return Frame(observation, probabilities, self.models)
+
+    def propose(self, frame: Frame, seed: int = 0) -> Candidates:
+        """Stage 3: pose candidates of every category."""
+        return self.method.propose(frame, seed)
+
+    def decide(self, frame: Frame, pool: Candidates, seed: int = 0) -> ParsedScene:
+        """Stage 4: the subset of candidates that explains the frame, with scores and sigmas."""
+        parsed = self.method.parse(frame, pool, seed, self.max_instances)
+        if self.sigmas:
+            start = time.monotonic()
+            sigma_t, sigma_r = pose_uncertainty(frame, parsed, self.method.pixels,
+                                                self.method.objects, stage_rng(seed, 'sigmas'))
+            parsed = replace(parsed, sigma_t=sigma_t, sigma_r=sigma_r).timed(
+                sigmas=time.monotonic() - start)
+        parsed = replace(parsed, objects=canonical_objects(parsed.objects, self.models))
+        return self.method.calibrate(frame, parsed)
+
+
+class _Laps:
+    """Wall time of the stages, one after the other."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+        self._clock = time.monotonic()
+
+    def __call__(self, stage: str, result: T) -> T:
+        now = time.monotonic()
+        self.seconds[stage], self._clock = now - self._clock, now
+        return result
+
+
+def _check_classify(classifier: Mapping[str, AnyArray], profile: Profile) -> None:
+    """Reject parameters of stage 2 that the classifier of the paper does not have."""
+    if not np.array_equal(classifier.get('kind', -1), KIND_PAPER):
+        return
+    defaults = profile_of(profile.name).classify.values()
+    for name, value in profile.classify.values().items():
+        if value != defaults[name]:
+            raise HoocError(f"parameter classify.{name} has no effect: the model holds the "
+                            "paper's forest, which reads every pixel and smooths nothing; leave "
+                            'it out or train the model for the profile best')

@@ -92,7 +92,7 @@ def test_every_parameter_can_be_set_by_its_flat_name(name):
     chosen = profile(name)
     for stage in ('observe', 'classify', 'propose', 'parse'):
         for parameter, value in chosen.stage(stage).values().items():
-            other = not value if isinstance(value, bool) else value + 1e-6 * isinstance(
-                value, float) + isinstance(value, int)
+            other = (not value if isinstance(value, bool) else value + 1 if isinstance(value, int)
+                     else 0.99 * value)
             changed = with_overrides(chosen, {f'{stage}.{parameter}': other})
             assert changed.stage(stage).values()[parameter] == other

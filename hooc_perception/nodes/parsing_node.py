@@ -26,7 +26,7 @@ from hooc_perception.ros.messages.stages import (
 )
 from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_of, tell
 from hooc_perception.ros.outputs.detect_service import DetectService
-from hooc_perception.ros.outputs.found import found_scene
+from hooc_perception.ros.outputs.detected import detected_scene
 from hooc_perception.ros.outputs.object_output import ObjectOutput
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import SetBool, Trigger
@@ -115,7 +115,7 @@ class ParsingNode(StageNode):
         ids, objects = self.tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
         left = unexplained_points(observation, objects, self.models)
-        scene = found_scene(parsed, ids, self.models, stamp_ns, self.config.target_frame)
+        scene = detected_scene(parsed, ids, self.models, stamp_ns, self.config.target_frame)
         age_s = (self.now_ns() - stamp_ns) * 1e-9
         self.output.publish(parsed, ids, stamp_ns, self.config.target_frame, age_s, left)
         self.answered = time.monotonic()

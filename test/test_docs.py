@@ -48,6 +48,9 @@ def test_commands_have_the_options_that_the_page_shows(page):
             continue
         parser = argparse.ArgumentParser()
         importlib.import_module(f'hooc_perception.cli.{command}').add_arguments(parser)
+        for tools in (a for a in parser._actions if isinstance(a, argparse._SubParsersAction)):
+            assert words[0] in tools.choices, command
+            parser = tools.choices[words[0]]
         known = set(parser._option_string_actions)
         assert {word.split('=')[0] for word in words if word.startswith('--')} <= known, command
 

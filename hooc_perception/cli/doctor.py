@@ -38,7 +38,8 @@ def run(args: Namespace) -> int:
     if args.salvage:
         args.bags = [_salvage(args.bags[0], args.salvage)]
     if args.bags:
-        from hooc_perception.diagnosis.bag import check_bag, check_rig
+        from hooc_perception.diagnosis.bag import check_bag
+        from hooc_perception.diagnosis.geometry import check_rig
         from hooc_perception.trained.folder import load_model_folder
         model = load_model_folder(args.model) if args.model else None
         for path in args.bags:

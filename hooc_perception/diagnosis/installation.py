@@ -1,7 +1,8 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Check that everything the package uses is there and works, by using it."""
+"""Check that everything the package depends on works, by using it."""
 
+from collections.abc import Iterator, Mapping
 import ctypes
 import importlib
 import importlib.metadata
@@ -20,17 +21,18 @@ from hooc_perception.extras import advice
 
 PYTHONS = ((3, 11), (3, 12))
 # Module -> (distribution, what does not work without it).
-PACKAGES = {
-    'numpy': ('numpy', 'anything'), 'scipy': ('scipy', 'anything'), 'numba': ('numba', 'anything'),
+PACKAGES: dict[str, tuple[str, str]] = {
+    'numpy': ('numpy', 'everything'), 'scipy': ('scipy', 'everything'),
+    'numba': ('numba', 'everything'),
     'yaml': ('PyYAML', 'scene sets'), 'cv2': ('opencv-contrib-python-headless', 'scene sets'),
-    'trimesh': ('trimesh', 'meshes'), 'manifold3d': ('manifold3d', 'the repair of meshes'),
-    'fcl': ('python-fcl', 'training'), 'mujoco': ('mujoco', 'training of the best profile'),
+    'trimesh': ('trimesh', 'meshes'), 'manifold3d': ('manifold3d', 'mesh repair'),
+    'fcl': ('python-fcl', 'training'), 'mujoco': ('mujoco', 'training with the best profile'),
     'sklearn': ('scikit-learn', 'evaluation'), 'rosbags': ('rosbags', 'bags'),
     'mcap': ('mcap', 'bags'),
-    'open3d': ('open3d', 'baselines of the evaluation'),
-    'pyrender': ('pyrender', 'shaded pictures in reports'),
+    'open3d': ('open3d', 'evaluation baselines'),
+    'pyrender': ('pyrender', 'shaded images in reports'),
     'matplotlib': ('matplotlib', 'plots'), 'jinja2': ('Jinja2', 'reports'),
-    'PIL': ('pillow', 'pictures'), 'tqdm': ('tqdm', 'progress bars'),
+    'PIL': ('pillow', 'images'), 'tqdm': ('tqdm', 'progress bars'),
     'psutil': ('psutil', 'benchmarks'), 'rclpy': ('ros-jazzy-rclpy', 'the nodes'),
 }
 # Shared library -> the Debian and Ubuntu package that holds it.
@@ -72,7 +74,7 @@ sys.exit(not heard)
 """
 
 
-def check_installation():
+def check_installation() -> Iterator[Finding]:
     """Yield a Finding for each check of this installation, cheap ones first."""
     yield check_python()
     yield from check_libraries()
@@ -87,17 +89,17 @@ def check_installation():
     yield from check_resources()
 
 
-def check_python(version=None):
+def check_python(version: tuple[int, int] | None = None) -> Finding:
     """Return the Finding on the interpreter; `version` is (major, minor), None = this one's."""
     version = version or sys.version_info[:2]
     text = f'{platform.python_version()} in {sys.prefix}'
-    if tuple(version) in PYTHONS:
+    if version in PYTHONS:
         return Finding(OK, 'Python', text)
-    return Finding(ERROR, 'Python', f'{version[0]}.{version[1]} is not served; '
+    return Finding(ERROR, 'Python', f'{version[0]}.{version[1]} is not supported; '
                    'install Python 3.12 or 3.11, remove .venv and ' + SETUP)
 
 
-def check_libraries(libraries=None):
+def check_libraries(libraries: Mapping[str, str] | None = None) -> Iterator[Finding]:
     """
     Yield a Finding for each system library.
 
@@ -116,8 +118,8 @@ def check_libraries(libraries=None):
                           f'not found; run "apt-get install {package}" as root')
 
 
-def check_packages(packages=None):
-    """Yield a Finding for each Python package, by importing it."""
+def check_packages(packages: Mapping[str, tuple[str, str]] | None = None) -> Iterator[Finding]:
+    """Yield a Finding for each Python package (as PACKAGES), by importing it."""
     pins = pinned()
     for module, (name, need) in (PACKAGES if packages is None else packages).items():
         try:
@@ -128,28 +130,29 @@ def check_packages(packages=None):
                 yield Finding(WARNING, name, f'optional, for {need}: {hint}')
                 continue
             yield Finding(ERROR, name, f'does not import ({_one_line(error)}), so {need} will '
-                          f'fail; {_mend(error)}')
+                          f'fail; {_fix(error)}')
             continue
         version = _version(name)
         pin = pins.get(name.lower())
         if pin and version and pin != version:
-            yield Finding(WARNING, name, f'{version} is installed, but {pin} is what the tests '
-                          f'ran with; {SETUP}')
+            yield Finding(WARNING, name, f'{version} is installed, but the tests ran with '
+                          f'{pin}; {SETUP}')
         else:
             yield Finding(OK, name, version or 'found')
 
 
-def pinned():
+def pinned() -> dict[str, str]:
     """Return {lower-case name: version} of requirements.txt, {} outside of a source tree."""
     path = Path(__file__).resolve().parents[2] / 'requirements.txt'
     if not path.is_file():
         return {}
-    return dict(line.split(';')[0].strip().split('==') for line in path.read_text().splitlines()
-                if '==' in line and not line.startswith('#'))
+    lines = (line.split(';')[0].strip().partition('==') for line in path.read_text().splitlines()
+             if '==' in line and not line.startswith('#'))
+    return {name: version for name, _, version in lines}
 
 
-def check_kernels():
-    """Return the Finding on compiled code: that a kernel runs, and where its cache is."""
+def check_kernels() -> Finding:
+    """Return the Finding on compiled code: whether a kernel runs, and where its cache is."""
     try:
         from hooc_perception.core.kernels import raster
         import numpy as np
@@ -158,102 +161,103 @@ def check_kernels():
     except Exception as error:
         return Finding(ERROR, 'compiled code', f'a kernel does not run ({_one_line(error)}); '
                        'set NUMBA_CACHE_DIR to a folder that you can write to')
-    return Finding(OK, 'compiled code', f'kept in {cache}')
+    return Finding(OK, 'compiled code', f'cached in {cache}')
 
 
-def check_gl():
+def check_gl() -> Finding:
     """Return the Finding on off-screen rendering: EGL, else OSMesa, else none."""
     errors = {}
     for name in ('egl', 'osmesa'):
         run = _probe(GL_PROBE, {'PYOPENGL_PLATFORM': name})
         if run.returncode == 0:
-            return Finding(OK, 'rendering', f'pyrender draws with {name.upper()}')
+            return Finding(OK, 'rendering', f'pyrender renders with {name.upper()}')
         errors[name] = _last_line(run.stderr)
-    return Finding(WARNING, 'rendering', f'pyrender draws neither with EGL ({errors["egl"]}) nor '
-                   'with OSMesa, so reports get plainer pictures; run "apt-get install libegl1 '
+    return Finding(WARNING, 'rendering', f'pyrender renders neither with EGL ({errors["egl"]}) '
+                   'nor with OSMesa, so reports get simpler images; run "apt-get install libegl1 '
                    'libgl1-mesa-dri" or "apt-get install libosmesa6" as root')
 
 
-def check_ros():
-    """Return the Finding on ROS: a message must come back through the middleware."""
+def check_ros() -> Finding:
+    """Return the Finding on ROS: whether a message passes through the middleware."""
     run = _probe(ROS_PROBE, {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'})
     if run.returncode == 0:
         rmw, place = run.stdout.split(None, 1)
-        text = f'a message came back through {rmw}; rclpy is in {place.strip()}'
+        text = f'a message passed through {rmw}; rclpy is in {place.strip()}'
         distro = os.environ.get('ROS_DISTRO')
         if distro and distro != 'jazzy':
-            return Finding(WARNING, 'ROS', f'works, but ROS {distro} is sourced and these nodes '
-                           'speak Jazzy; open a shell without it')
+            return Finding(WARNING, 'ROS', f'it works, but ROS {distro} is sourced and these '
+                           'nodes are built for Jazzy; open a shell without it')
         return Finding(OK, 'ROS', text)
     if os.environ.get('RMW_IMPLEMENTATION', 'rmw_fastrtps_cpp') != 'rmw_fastrtps_cpp':
         return Finding(ERROR, 'ROS', f'the middleware {os.environ["RMW_IMPLEMENTATION"]} is not '
                        'installed here; unset RMW_IMPLEMENTATION')
-    return Finding(ERROR, 'ROS', 'no message comes back through the middleware '
-                   f'({_last_line(run.stderr) or "silence"}); check that the loopback network is '
-                   'up and that no firewall stops UDP on it')
+    return Finding(ERROR, 'ROS', 'no message passes through the middleware '
+                   f'({_last_line(run.stderr) or "no error was printed"}); check that the '
+                   'loopback network is up and that no firewall blocks UDP on it')
 
 
-def check_shared_memory(folder='/dev/shm', need_mb=640):
+def check_shared_memory(folder: str = '/dev/shm', need_mb: float = 640) -> Finding:
     """
-    Return the Finding on shared memory, through which images travel fastest.
+    Return the Finding on shared memory, the fastest transport for images.
 
-    :param need_mb: what the supervisor's transport profile wants: 8 processes x 64 MB x 1.25.
+    :param need_mb: what the transport profile of the supervisor needs: 8 processes x 64 MB x
+        1.25.
     """
     if not os.path.isdir(folder):
-        return Finding(WARNING, 'shared memory', f'{folder} is missing, so images take the slower '
-                       'way; mount a tmpfs there')
+        return Finding(WARNING, 'shared memory', f'{folder} is missing, so images use a slower '
+                       'transport; mount a tmpfs there')
     free = shutil.disk_usage(folder).free / 2 ** 20
     if free < need_mb:
         return Finding(WARNING, 'shared memory', f'{folder} has {free:.0f} MB free of the '
-                       f'{need_mb} MB that fast transport wants, so images take the slower way; '
-                       'remove stale files there, or start the container with --shm-size=1g')
+                       f'{need_mb:g} MB that the fast transport needs, so images use a slower '
+                       'one; remove stale files there, or start the container with --shm-size=1g')
     return Finding(OK, 'shared memory', f'{free / 1024:.1f} GB free')
 
 
-def check_resources():
-    """Yield the Findings on disk and memory."""
+def check_resources() -> Iterator[Finding]:
+    """Yield the Findings on disk space and memory."""
     for place in dict.fromkeys((os.getcwd(), tempfile.gettempdir())):
         free = shutil.disk_usage(place).free / 2 ** 30
         low = free < LOW_DISK_GB
         yield Finding(WARNING if low else OK, 'disk', f'{free:.1f} GB free in {place}'
-                      + ('; free some space before you train or record' if low else ''))
+                      + ('; free some space before training or recording' if low else ''))
     memory = os.sysconf('SC_PAGE_SIZE') * os.sysconf('SC_PHYS_PAGES') / 2 ** 30
     low = memory < LOW_MEMORY_GB
     yield Finding(WARNING if low else OK, 'memory', f'{memory:.1f} GB, {os.cpu_count()} cores'
                   + ('; training may need 4 GB' if low else ''))
 
 
-def _probe(code, variables):
-    """Run Python code in a process of its own, so that a crash there is only a finding."""
+def _probe(code: str, variables: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
+    """Run Python code in a process of its own, so that a crash becomes a finding."""
     try:
         return subprocess.run([sys.executable, '-c', code], env={**os.environ, **variables},
                               capture_output=True, text=True, timeout=60)
     except subprocess.TimeoutExpired as error:
-        return subprocess.CompletedProcess(error.cmd, 124, '', 'no answer within 60 s')
+        return subprocess.CompletedProcess(error.cmd, 124, '', 'no response within 60 s')
 
 
-def _mend(error):
-    """Return what to do about a failed import."""
+def _fix(error: Exception) -> str:
+    """Return the fix for a failed import."""
     found = re.search(r'(lib[\w.+-]+\.so[.\d]*)', str(error))
     if found and found[1] in LIBRARIES:
         return f'run "apt-get install {LIBRARIES[found[1]]}" as root'
     return SETUP
 
 
-def _version(name):
-    """Return the installed version of a distribution, None where it has no metadata."""
+def _version(name: str) -> str | None:
+    """Return the installed version of a distribution, None if it has no metadata."""
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:
         return None
 
 
-def _one_line(error):
+def _one_line(error: Exception) -> str:
     """Return an exception as one short line."""
     return (' '.join(str(error).split()) or type(error).__name__)[:160]
 
 
-def _last_line(text):
+def _last_line(text: str) -> str:
     """Return the last line of an error output, shortened."""
     lines = text.strip().splitlines()
     return lines[-1].strip()[:160] if lines else ''

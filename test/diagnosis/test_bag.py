@@ -298,7 +298,7 @@ def test_a_damaged_bag_is_salvaged_and_checked_again(sound, tmp_path, capsys):
 @pytest.mark.parametrize('cameras, word', [(3, 'can be used'), (2, 'trained for 2 cameras')])
 def test_models_that_do_not_fit_the_rig(sound, cameras, word):
     from hooc_perception.core.classification.classify import KIND_PAPER
-    from hooc_perception.diagnosis.bag import check_rig
+    from hooc_perception.diagnosis.geometry import check_rig
     model = SimpleNamespace(name='m', classifier={'kind': np.array(KIND_PAPER)}, cameras=tuple(
         camera_above(f'camera{i}', i * 2.1) for i in range(cameras)))
     (finding,) = check_rig(sound, model)

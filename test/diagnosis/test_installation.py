@@ -20,7 +20,7 @@ def test_a_message_comes_back():
     assert finding.level == OK, finding.text
 
 
-def test_rendering_is_found_or_its_mend_named():
+def test_rendering_is_found_or_its_fix_named():
     finding = installation.check_gl()
     assert finding.level == OK or 'libosmesa6' in finding.text
 

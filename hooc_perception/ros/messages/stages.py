@@ -1,15 +1,26 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""What the stages hand on, as messages: probabilities, candidates, objects; there and back."""
+"""The results of the stages as messages and back: probabilities, candidates, objects."""
 
+from collections.abc import Iterable, Sequence
 import json
 
+from geometry_msgs.msg import PoseArray
+from hooc_perception.core.arrays import AnyArray, UInt8Array
 from hooc_perception.core.geometry import back_project
-from hooc_perception.core.types import Candidates, PixelProbabilities
+from hooc_perception.core.types import (
+    Candidates,
+    GenericModel,
+    Observation,
+    ParsedScene,
+    PixelProbabilities,
+)
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.messages.conversions import pose_array_message, poses_from_message
 from hooc_perception.ros.messages.point_clouds import cloud_message, cloud_rows, row_dtype
 import numpy as np
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Header
 
 PIXEL_COLUMNS = (('camera', 'u1'), ('u', 'u2'), ('v', 'u2'), ('x', 'f4'), ('y', 'f4'),
                  ('z', 'f4'))
@@ -23,21 +34,24 @@ SIZE = ('size_x', 'size_y', 'size_z')
 
 # Bits of `flags`.
 FLAG_SEARCH_STOPPED = 1     # a deadline ended the search before it converged
-FLAG_ONE_VIEW = 2           # only one camera shows the object
-FLAG_TURNED = 4             # turned by half a turn it would explain the images about as well
+FLAG_ONE_VIEW = 2           # only one camera sees the object
+FLAG_TURNED = 4             # rotated by half a turn it would fit the images about as well
 
 
-def probabilities_message(probabilities, observation, names, head):
+def probabilities_message(probabilities: PixelProbabilities, observation: Observation,
+                          names: Sequence[str], head: Header) -> PointCloud2:
     """
-    Return the PointCloud2 of PixelProbabilities, one row a listed pixel.
+    Return the PointCloud2 of PixelProbabilities, one row per listed pixel.
 
-    :param observation: gives x, y, z of the pixels, world frame, metres (NaN without reading).
-    :param names: class names 1..N; the columns after z are background and these.
+    :param observation: gives x, y, z of the pixels, world frame, metres (NaN = no reading).
+    :param names: names of the classes 1..N; after z come one column for the background and one
+        per name.
+    :raises HoocError: if the number of classes differs.
     """
     classes = [('p_background', 'u1')] + [(f'p_{name}', 'u1') for name in names]
     if probabilities.p.shape[1] != len(classes):
-        raise HoocError(f'the classifier knows {probabilities.p.shape[1] - 1} categories but the '
-                        f'model {len(names)}; train the model again')
+        raise HoocError(f'the classifier knows {probabilities.p.shape[1] - 1} categories, but '
+                        f'the model has {len(names)}; train the model again')
     rows = np.zeros(len(probabilities.camera), row_dtype(PIXEL_COLUMNS + tuple(classes)))
     rows['camera'] = probabilities.camera
     rows['u'], rows['v'] = probabilities.uv[:, 0], probabilities.uv[:, 1]
@@ -50,16 +64,19 @@ def probabilities_message(probabilities, observation, names, head):
     return cloud_message(rows, head)
 
 
-def probabilities_from_message(message, observation=None, n_models=None):
+def probabilities_from_message(message: PointCloud2, observation: Observation | None = None,
+                               n_models: int | None = None) -> PixelProbabilities:
     """
-    Return the PixelProbabilities of their PointCloud2; class columns in message order.
+    Return the PixelProbabilities of a PointCloud2; class columns in the order of the message.
 
-    :param observation, n_models: what they must fit; compiled code trusts their indices.
-    :raises HoocError: where a column is missing, or they are those of other cameras or models.
+    :param observation: its views must have the pixels; compiled code relies on valid indices.
+    :param n_models: the number of categories that the message must have.
+    :raises HoocError: if a column is missing, or if the message belongs to other cameras or to
+        another model.
     """
     known = [name for name, _ in PIXEL_COLUMNS]
     rows = cloud_rows(message, known)
-    classes = [name for name in rows.dtype.names if name not in known]
+    classes = [name for name in rows.dtype.names or () if name not in known]
     p = np.empty((len(rows), len(classes)), np.uint8)
     for c, name in enumerate(classes):
         p[:, c] = rows[name]
@@ -67,16 +84,16 @@ def probabilities_from_message(message, observation=None, n_models=None):
     if observation is not None:
         sizes = np.array([view.depth.shape[::-1] for view in observation.views])
         if len(rows) and (camera.max() >= len(sizes) or (uv >= sizes[camera]).any()):
-            raise HoocError('pixels/probabilities names pixels that the views do not have; give '
-                            'all nodes the same parameter cameras')
+            raise HoocError('pixels/probabilities refers to pixels outside of the views; set the '
+                            'parameter cameras to the same list in all nodes')
     if n_models is not None and len(classes) != n_models + 1:
         raise HoocError(f'pixels/probabilities has {len(classes) - 1} categories, but the model '
-                        f'{n_models}; give all nodes the same parameter model')
+                        f'has {n_models}; set the parameter model to the same folder in all nodes')
     return PixelProbabilities(camera.astype(np.uint8), uv.astype(np.uint16), p)
 
 
-def label_images(probabilities, observation):
-    """Return one (H, W) uint8 image a view: most likely class id, 0 background."""
+def label_images(probabilities: PixelProbabilities, observation: Observation) -> list[UInt8Array]:
+    """Return one (H, W) uint8 image per view: most likely class id, 0 = background."""
     images = [np.zeros(view.depth.shape, np.uint8) for view in observation.views]
     best = probabilities.p.argmax(1).astype(np.uint8)
     for i, image in enumerate(images):
@@ -85,7 +102,7 @@ def label_images(probabilities, observation):
     return images
 
 
-def candidates_messages(candidates, head):
+def candidates_messages(candidates: Candidates, head: Header) -> tuple[PoseArray, PointCloud2]:
     """Return (PoseArray, PointCloud2) of Candidates; row i belongs to pose i."""
     rows = np.zeros(len(candidates), row_dtype(CANDIDATE_COLUMNS))
     rows['x'], rows['y'], rows['z'] = candidates.translation.T
@@ -96,39 +113,41 @@ def candidates_messages(candidates, head):
             cloud_message(rows, head))
 
 
-def candidates_from_messages(poses, attributes, n_models=None):
+def candidates_from_messages(poses: PoseArray, attributes: PointCloud2,
+                             n_models: int | None = None) -> Candidates:
     """
-    Return the Candidates of their two messages, exactly.
+    Return the Candidates of their two messages, exactly as they were sent.
 
-    Objects carry the same columns and more, so this reads `objects/*` as well.
+    Objects have the same columns and more, so this also reads `objects/*`.
 
-    :param n_models: how many categories there are; compiled code trusts the class ids.
-    :raises HoocError: where the two do not belong together, or are no candidates.
+    :param n_models: the number of categories; compiled code relies on valid class ids.
+    :raises HoocError: if the messages do not belong together, or hold invalid candidates.
     """
     translation, rotation = poses_from_message(poses)
     rows = cloud_rows(attributes, [name for name, _ in CANDIDATE_COLUMNS])
     if len(rows) != len(translation) or attributes.header.stamp != poses.header.stamp:
         raise HoocError(f'{len(translation)} poses came with {len(rows)} rows of attributes; two '
-                        'nodes are publishing on the same topics')
+                        'nodes publish on the same topics: stop one of them')
     category, size = rows['category'], np.stack([rows[name] for name in SIZE], -1)
     if n_models is not None and len(rows):
         if category.min() < 1 or category.max() > n_models:
-            raise HoocError(f'candidates of a category that the model with its {n_models} does '
-                            'not have; give all nodes the same parameter model')
+            raise HoocError(f'candidates have a category outside of the {n_models} of the model; '
+                            'set the parameter model to the same folder in all nodes')
         if not (np.isfinite(translation).all() and np.isfinite(size).all() and (size > 0).all()
                 and (np.abs(np.linalg.norm(rotation, axis=1) - 1) < 1e-3).all()):
-            raise HoocError('candidates whose poses or sizes are none; is another node '
-                            'publishing on their topics?')
+            raise HoocError('candidates have invalid poses or sizes; check whether another node '
+                            'publishes on their topics')
     return Candidates(category.astype(np.uint16), translation, rotation, size.astype(np.float32),
                       rows['score'].astype(np.float32))
 
 
-def objects_messages(parsed, ids, age_s, head):
+def objects_messages(parsed: ParsedScene, ids: Sequence[int] | AnyArray, age_s: float,
+                     head: Header) -> tuple[PoseArray, PointCloud2]:
     """
     Return (PoseArray, PointCloud2) of a ParsedScene: `objects/poses` and `objects/attributes`.
 
     :param ids: (n,) uint32 instance ids.
-    :param age_s: seconds from the frame set's stamp to now.
+    :param age_s: seconds from the stamp of the frame set to now.
     """
     objects = parsed.objects
     rows = np.zeros(len(objects), row_dtype(OBJECT_COLUMNS))
@@ -138,12 +157,11 @@ def objects_messages(parsed, ids, age_s, head):
     for axis, name in enumerate(SIZE):
         rows[name] = objects.size[:, axis]
     rows['score'], rows['category'], rows['id'] = objects.score, objects.category, ids
-    for name in ('visible_ratio', 'residual_m', 'energy_delta', 'n_views'):
-        rows[name] = getattr(parsed, name)
-    for name in ('sigma_t', 'sigma_r'):
-        sigma = getattr(parsed, name)
-        # Where nobody asked, a zero would claim perfection.
-        rows[name] = np.nan if sigma is None else sigma
+    rows['visible_ratio'], rows['residual_m'] = parsed.visible_ratio, parsed.residual_m
+    rows['energy_delta'], rows['n_views'] = parsed.energy_delta, parsed.n_views
+    # NaN where it was not estimated: a zero would claim perfection.
+    rows['sigma_t'] = np.nan if parsed.sigma_t is None else parsed.sigma_t
+    rows['sigma_r'] = np.nan if parsed.sigma_r is None else parsed.sigma_r
     rows['age_s'] = age_s
     rows['flags'] = (0 if parsed.converged else FLAG_SEARCH_STOPPED) | np.where(
         parsed.n_views == 1, FLAG_ONE_VIEW, 0) | np.where(
@@ -152,10 +170,11 @@ def objects_messages(parsed, ids, age_s, head):
             cloud_message(rows, head))
 
 
-def points_message(points, head, camera=None):
-    """Return the PointCloud2 of (n, 3) points, with column `camera` where (n,) is given."""
-    columns = [('x', 'f4'), ('y', 'f4'), ('z', 'f4')] + ([('camera', 'u1')] if camera is not None
-                                                         else [])
+def points_message(points: AnyArray, head: Header, camera: AnyArray | None = None) -> PointCloud2:
+    """Return the PointCloud2 of (n, 3) points, with a column `camera` if (n,) is given."""
+    columns = [('x', 'f4'), ('y', 'f4'), ('z', 'f4')]
+    if camera is not None:
+        columns.append(('camera', 'u1'))
     rows = np.zeros(len(points), row_dtype(columns))
     rows['x'], rows['y'], rows['z'] = np.asarray(points).reshape(-1, 3).T
     if camera is not None:
@@ -163,13 +182,15 @@ def points_message(points, head, camera=None):
     return cloud_message(rows, head)
 
 
-def labels_json(models, meshes, ids=(), categories=()):
+def labels_json(models: Sequence[GenericModel], meshes: Sequence[tuple[str, str]],
+                ids: Iterable[int] = (), categories: Iterable[int] = ()) -> str:
     """
-    Return the text of `objects/labels`: what a class id and an instance id mean.
+    Return the text of `objects/labels`, the meaning of class ids and instance ids.
 
-    :param models: tuple of GenericModel; class id c is models[c - 1].
-    :param meshes: one (URI, sha256 in hex) a model.
-    :param ids, categories: instance ids and class ids of the latest objects.
+    :param models: class id c is models[c - 1].
+    :param meshes: one (URI, sha256 in hex) per model.
+    :param ids: instance ids of the latest objects.
+    :param categories: their class ids.
     """
     classes = {str(c): {'name': model.name, 'mesh': uri, 'sha256': digest,
                         'extents_m': [round(float(x), 6) for x in model.extents],

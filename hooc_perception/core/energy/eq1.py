@@ -19,6 +19,7 @@ the share of object k's volume inside any other chosen object. Where the paper i
 from hooc_perception.core.energy.compositor import Compositor
 from hooc_perception.core.energy.images_and_volumes import ImagesAndVolumes
 from hooc_perception.core.energy.overlap import OverlapTerm
+from hooc_perception.core.frame.pixel_index import rows_of_pixels, stacked_index
 from hooc_perception.core.geometry import posed_vertices
 from hooc_perception.core.render import render_patch
 from hooc_perception.core.types import Energy
@@ -70,7 +71,8 @@ class Eq1(ImagesAndVolumes):
         background = np.concatenate([view.background.ravel() for view in observation.views])
         read = np.isfinite(measured)
         self.n_pixels = max(int(read.sum()), 1)
-        row = _listed_row(observation, probabilities)
+        row = rows_of_pixels(stacked_index(observation.views, probabilities.camera,
+                                           probabilities.uv), len(measured))
         # A last row for all pixels that are not listed: background with certainty.
         miss = 1.0 - np.vstack([probabilities.p, np.zeros((1, probabilities.p.shape[1]))]) / 255.0
         miss[-1, 0] = 0.0
@@ -122,17 +124,6 @@ class Eq1(ImagesAndVolumes):
         return Energy(total(self._none_depth, self._depth) / self.n_pixels,
                       total(self._none_miss, self._miss) / self.n_pixels,
                       float(self._overlap.evaluate(mask)) / max(np.count_nonzero(mask), 1))
-
-
-def _listed_row(observation, probabilities):
-    """Return (P,) int64: the row of PixelProbabilities for every pixel of all views, or -1."""
-    sizes = [view.depth.size for view in observation.views]
-    widths = np.array([view.depth.shape[1] for view in observation.views])
-    row = np.full(sum(sizes), -1, np.int64)
-    camera, uv = probabilities.camera.astype(np.int64), probabilities.uv.astype(np.int64)
-    first = np.cumsum([0] + sizes)[:-1]
-    row[first[camera] + uv[:, 1] * widths[camera] + uv[:, 0]] = np.arange(len(camera))
-    return row
 
 
 def energy_of(observation, probabilities, objects, models):

@@ -11,9 +11,9 @@ from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.diagnosis.bag import check_bag
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.files import iter_messages
-from hooc_perception.io.bags.mcap_file import records
+from hooc_perception.io.bags.mcap_format import records
 from hooc_perception.io.bags.reader import BagScene
-from hooc_perception.io.bags.salvage import salvaged
+from hooc_perception.io.bags.salvage import salvage_bag
 from hooc_perception.io.bags.writer import write_bag
 import numpy as np
 
@@ -76,7 +76,7 @@ def _read(bag):
     """Do with a bag what `hooc run` and `hooc doctor` do, then salvage it."""
     first = None
     for action in (lambda: BagScene(bag).views(), lambda: list(iter_messages(bag)),
-                   lambda: salvaged(bag)):
+                   lambda: salvage_bag(bag)):
         try:
             action()
         except HoocError as error:

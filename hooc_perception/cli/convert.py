@@ -65,7 +65,7 @@ def write_calibrations(entries: Iterable[str], unit: float, out: Path) -> None:
     """Write a cameras.yaml from entries NAME=FILE[#VIEW]."""
     from hooc_perception.io.scenes.bouguet import load_bouguet, upright
     from hooc_perception.io.scenes.camera_files import write_cameras
-    from hooc_perception.io.scenes.files import unique
+    from hooc_perception.io.scenes.fields import unique
 
     if not 1e-6 <= unit <= 1:
         raise HoocError(f'--unit is {unit:g}; give metres, 0.001 for a board in millimetres')

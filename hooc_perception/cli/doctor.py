@@ -58,8 +58,8 @@ def run(args: Namespace) -> int:
 
 def _salvage(path: Path, out: Path) -> Path:
     """Write the readable part of a bag to a new one; return the path of that."""
-    from hooc_perception.io.bags.salvage import salvaged, write_salvaged
-    found = salvaged(path)
+    from hooc_perception.io.bags.salvage import salvage_bag, write_salvaged
+    found = salvage_bag(path)
     for note in dict.fromkeys(found.notes):
         print(f'  {note}')
     if not found.messages:

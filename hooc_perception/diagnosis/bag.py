@@ -17,7 +17,7 @@ from hooc_perception.diagnosis.streams import (
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.camera_topics import camera_from_info, depth_topics
 from hooc_perception.io.bags.files import topics
-from hooc_perception.io.bags.salvage import salvaged
+from hooc_perception.io.bags.salvage import salvage_bag
 
 
 def check_bag(path: Path) -> Iterator[Finding]:
@@ -55,7 +55,7 @@ def check_bag(path: Path) -> Iterator[Finding]:
 def check_remains(path: Path) -> Iterator[Finding]:
     """Yield how much of a damaged bag can still be read."""
     try:
-        found = salvaged(path, keep=False)
+        found = salvage_bag(path, keep=False)
     except HoocError as error:
         yield Finding(ERROR, 'salvage', str(error))
         return

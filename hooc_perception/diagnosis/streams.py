@@ -11,7 +11,8 @@ from typing import Any
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.files import BagTopic, iter_messages
-from hooc_perception.io.depth_encodings import decode_depth, NEAREST_M
+from hooc_perception.io.depth_encodings import decode_depth
+from hooc_perception.io.depth_units import NEAREST_M
 import numpy as np
 
 IMAGE, INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'

@@ -1,25 +1,31 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The one table of depth encodings: what is valid, how to get metres, how to come back.
+Decode and encode depth images: which values are valid and how many metres they are.
 
 Everything behind this file sees float32 metres with NaN = no reading (REP-118). Scene sets,
 bags and the ROS layer all decode here, so that they agree bit for bit.
 """
 
+from typing import Any, TypeAlias
+
+from hooc_perception.core.arrays import AnyArray, Float32Array, UInt16Array
 from hooc_perception.errors import HoocError
 import numpy as np
+import numpy.typing as npt
 
-# No depth camera measures nearer than this; what does, holds another unit.
-NEAREST_M = 0.05
-FEW = 0.02
+# collections.abc.Buffer came with Python 3.12.
+Buffer: TypeAlias = bytes | bytearray | memoryview | AnyArray | Any
+
 MILLIMETRES = '16UC1'
 METRES = '32FC1'
-_DTYPES = {MILLIMETRES: np.dtype(np.uint16), 'mono16': np.dtype(np.uint16),
-           METRES: np.dtype(np.float32)}
+_DTYPES: dict[str, np.dtype[Any]] = {
+    MILLIMETRES: np.dtype(np.uint16), 'mono16': np.dtype(np.uint16), METRES: np.dtype(np.float32)}
+DEPTH_ENCODINGS = tuple(_DTYPES)
 
 
-def depth_from_counts(counts, unit=0.001):
+def depth_from_counts(counts: npt.NDArray[np.unsignedinteger],
+                      unit: float = 0.001) -> Float32Array:
     """
     Return float32 metres, NaN = none, of integer depth counts of any shape.
 
@@ -31,24 +37,25 @@ def depth_from_counts(counts, unit=0.001):
     return depth
 
 
-def counts_from_depth(depth, unit=0.001):
-    """Return uint16 counts, 0 = none, of metres; what does not fit into 16 bits becomes 0."""
+def counts_from_depth(depth: npt.ArrayLike, unit: float = 0.001) -> UInt16Array:
+    """Return uint16 counts, 0 = none, of metres; values that exceed 16 bits become 0."""
     with np.errstate(invalid='ignore'):
         counts = np.rint(np.asarray(depth, np.float64) / unit)
         fits = (counts >= 1) & (counts <= np.iinfo(np.uint16).max)
     return np.where(fits, counts, 0).astype(np.uint16)
 
 
-def decode_depth(data, height, width, encoding, step=0, is_bigendian=False):
+def decode_depth(data: Buffer, height: int, width: int, encoding: str, step: int = 0,
+                 is_bigendian: bool | int = False) -> Float32Array:
     """
     Return the (height, width) float32 depth in metres, NaN = none, of an image message's data.
 
     :param data: anything with the buffer protocol (bytes, array, uint8 ndarray).
     :param encoding: '16UC1' or 'mono16' (millimetres, 0 = none) or '32FC1' (metres; NaN,
         infinite and non-positive values = none).
-    :param step: bytes a row, 0 = packed rows.
-    :param is_bigendian: byte order of `data`, whatever the machine's.
-    :raises HoocError: for another encoding or a buffer that does not hold the image.
+    :param step: bytes per row, 0 = packed rows.
+    :param is_bigendian: byte order of `data`.
+    :raises HoocError: for another encoding or a buffer that is too short for the image.
     """
     counts_or_metres = decode_image(data, height, width, _dtype(encoding), step, is_bigendian)
     if encoding != METRES:
@@ -59,11 +66,12 @@ def decode_depth(data, height, width, encoding, step=0, is_bigendian=False):
     return depth
 
 
-def decode_image(data, height, width, dtype, step=0, is_bigendian=False):
+def decode_image(data: Buffer, height: int, width: int, dtype: npt.DTypeLike, step: int = 0,
+                 is_bigendian: bool | int = False) -> AnyArray:
     """
-    Return a read-only (height, width) view of an image message's data, row padding cut off.
+    Return the (height, width) pixels of an image message's data, row padding cut off.
 
-    :raises HoocError: where `step` or the buffer's length cannot hold the image.
+    :raises HoocError: if `step` or the buffer is too small for the image.
     """
     dtype = np.dtype(dtype).newbyteorder('>' if is_bigendian else '<')
     row = width * dtype.itemsize
@@ -77,17 +85,17 @@ def decode_image(data, height, width, dtype, step=0, is_bigendian=False):
     if flat.size < step * (height - 1) + row:
         raise HoocError(f'an image of {width} x {height} pixels with step {step} needs '
                         f'{step * height} bytes, but has {flat.size}: check the camera driver')
-    # as_strided also accepts a last row without its padding and steps that split a number.
+    # as_strided also accepts a last row without padding and steps that split a number.
     rows = np.lib.stride_tricks.as_strided(flat, (height, row), (step, 1), writeable=False)
     return np.ascontiguousarray(rows).view(dtype)
 
 
-def encode_depth(depth, encoding=MILLIMETRES):
+def encode_depth(depth: Float32Array, encoding: str = MILLIMETRES) -> tuple[bytes, int, int]:
     """
     Return (data, step, is_bigendian) of a depth image in metres, for an image message.
 
     :param depth: (H, W) metres, NaN = none.
-    :return: little-endian bytes, bytes a row, 0.
+    :return: little-endian bytes, bytes per row, 0.
     :raises HoocError: for an encoding that is not a depth encoding.
     """
     dtype = _dtype(encoding)
@@ -96,35 +104,9 @@ def encode_depth(depth, encoding=MILLIMETRES):
     return pixels.tobytes(), pixels.shape[1] * dtype.itemsize, 0
 
 
-def _dtype(encoding):
+def _dtype(encoding: str) -> np.dtype[Any]:
     """Return the pixel type of a depth encoding."""
     if encoding not in _DTYPES:
         raise HoocError(f'encoding {encoding!r} is not a depth encoding: publish '
                         f'{MILLIMETRES} (millimetres) or {METRES} (metres)')
     return _DTYPES[encoding]
-
-
-def unit_trouble(depth, encoding, max_depth_m):
-    """
-    Say what is wrong with the unit of a depth image, None where it seems right.
-
-    :param depth: (H, W) float32 metres, NaN = none, as decoded.
-    :param encoding: of the message, which promises a unit.
-    :param max_depth_m: readings farther away are of no use.
-    """
-    readings = depth[::4, ::4]
-    readings = readings[np.isfinite(readings)]
-    if not len(readings):
-        return None
-    median = float(np.median(readings))
-    if (readings <= max_depth_m).mean() < FEW:
-        seems = ('millimetres' if median > 100 else None) if encoding == METRES else (
-            'a finer unit than millimetres' if median < 65 else 'saturated readings')
-        return (f'its readings lie {median:.3g} m away, beyond {max_depth_m:g} m (observe.'
-                f'max_depth_m)' + (f', so {encoding} seems to hold {seems}' if seems else '')
-                + '; publish 16UC1 in millimetres or 32FC1 in metres')
-    if median < NEAREST_M:
-        seems = 'metres or centimetres' if encoding != METRES else 'kilometres'
-        return (f'its readings lie {1000 * median:.3g} mm away, so {encoding} seems to hold '
-                f'{seems}; publish 16UC1 in millimetres or 32FC1 in metres')
-    return None

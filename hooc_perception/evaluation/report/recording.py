@@ -9,7 +9,7 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.page import palette_of
 from hooc_perception.evaluation.report.space import extent_of, seen_points
-from hooc_perception.io.scenes.files import written_whole
+from hooc_perception.io.scenes.files import atomic_file
 import numpy as np
 
 TIMELINE = 'scene'
@@ -45,7 +45,7 @@ def write_recording(path, scenes, title='Objects on the table'):
     """
     rr, path = rerun_sdk(), Path(path)
     palette = palette_of(scenes)
-    with written_whole(path) as part:
+    with atomic_file(path) as part:
         recording = rr.RecordingStream(title)
         recording.save(part, default_blueprint=_blueprint(rr, scenes))
         recording.log('world', rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)

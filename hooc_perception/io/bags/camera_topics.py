@@ -1,33 +1,39 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which topics of a bag are depth cameras, and how they are calibrated."""
+"""Find the depth cameras among the topics of a bag, and their calibrations."""
 
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 import re
+from typing import Any, TYPE_CHECKING
 
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
+from hooc_perception.io.depth_encodings import DEPTH_ENCODINGS
 from hooc_perception.io.scenes import camera_files
 import numpy as np
 
-DEPTH_ENCODINGS = ('16UC1', 'mono16', '32FC1')
-# Drivers publish the same image in several states; the rawest one of a camera is taken.
+if TYPE_CHECKING:
+    from hooc_perception.io.bags.files import BagTopic
+
+# Drivers publish the same image in several states; the rawest one of a camera is used.
 _STATES = ('image_raw', 'image_rect_raw', 'image', 'image_rect')
 RECTIFIED = ('image_rect',)
 
 
-def depth_topics(firsts, path):
+def depth_topics(firsts: Mapping[str, Any], path: str | Path) -> dict[str, str]:
     """
     Return {camera name: depth image topic} of a bag.
 
-    A depth topic carries images in a depth encoding and has `depth` in its name, which tells
-    it from infrared images; where none has, the encoding alone decides.
+    A depth topic carries images in a depth encoding and has `depth` in its name, which
+    distinguishes it from infrared images; if no name has, the encoding alone decides.
 
     :param firsts: {topic: its first Image message}.
-    :raises HoocError: where there is none; the message lists what images there are.
+    :raises HoocError: if there is none; the message lists the images of the bag.
     """
     depth_like = [topic for topic, image in firsts.items() if image.encoding in DEPTH_ENCODINGS]
     named = [topic for topic in depth_like if 'depth' in topic.lower()]
-    chosen = {}
+    chosen: dict[str, str] = {}
     for topic in sorted(named or [t for t in depth_like if 'infra' not in t and '/ir' not in t],
                         key=_rank):
         chosen.setdefault(topic.rpartition('/')[0], topic)
@@ -35,7 +41,7 @@ def depth_topics(firsts, path):
         there = ', '.join(f'{topic} ({image.encoding})' for topic, image in firsts.items())
         raise HoocError(f'{path}: there is no depth topic among its images ({there or "none"}); '
                         'record sensor_msgs/Image topics in 16UC1 or 32FC1')
-    names = {}
+    names: dict[str, str] = {}
     for folder, topic in chosen.items():
         name = _camera_name(folder)
         while name in names:
@@ -44,13 +50,14 @@ def depth_topics(firsts, path):
     return names
 
 
-def camera_from_info(name, topic, infos, image, path):
+def camera_from_info(name: str, topic: str, infos: Mapping[str, Any], image: Any,
+                     path: str | Path) -> Camera:
     """
-    Return the Camera, without a pose, whose CameraInfo lies beside a depth topic.
+    Return the Camera, without a pose, of the CameraInfo topic beside a depth topic.
 
     :param infos: {topic: CameraInfo message}.
     :param image: an Image message of the topic, for its size.
-    :raises HoocError: where there is no CameraInfo or it is no calibration.
+    :raises HoocError: if there is no CameraInfo or it is not a calibration.
     """
     info_topic = topic.rpartition('/')[0] + '/camera_info'
     if info_topic not in infos:
@@ -72,14 +79,15 @@ def camera_from_info(name, topic, infos, image, path):
                   camera_files.distortion(D.tolist(), model, where), np.eye(4), model)
 
 
-def cameras_without_depth(topics, found, listed):
+def cameras_without_depth(topics: Mapping[str, 'BagTopic'], found: Iterable[str],
+                          listed: Iterable[str]) -> list[str]:
     """
-    Return the names of cameras that a bag speaks of without any depth image of theirs.
+    Return the names of cameras that a bag mentions without any depth image.
 
-    Calibrations, poses and empty topics beside a depth image speak of a camera.
+    A bag mentions a camera by its calibration, its pose or an empty image topic.
 
     :param topics: {name: BagTopic}.
-    :param found: the names that `depth_topics` has found.
+    :param found: the names from `depth_topics`.
     :param listed: the names in scene_info.
     """
     names = set(listed)
@@ -93,13 +101,13 @@ def cameras_without_depth(topics, found, listed):
     return sorted(names - set(found))
 
 
-def _rank(topic):
-    """Sort the rawest state of an image first, then by name."""
+def _rank(topic: str) -> tuple[int, str]:
+    """Return a sort key: the rawest state of an image first, then by name."""
     state = topic.rpartition('/')[2]
     return _STATES.index(state) if state in _STATES else len(_STATES), topic
 
 
-def _camera_name(folder):
+def _camera_name(folder: str) -> str:
     """Return a camera's name from the folder of its image: /hooc/kinect1/depth -> kinect1."""
     tokens = [t for t in folder.split('/') if t]
     if tokens and tokens[0] == 'hooc':

@@ -1,19 +1,24 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Open bags of any origin and iterate over their messages; what is wrong becomes a sentence."""
+"""Open bags of any origin and iterate over their messages; every failure is a HoocError."""
 
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hooc_perception.errors import HoocError
-from hooc_perception.io.bags import mcap_file
+from hooc_perception.io.bags.bag_format import TYPES
+from hooc_perception.io.bags.mcap_checks import check_mcap
 from hooc_perception.io.scenes import files
-from rosbags.interfaces import QosDurability, QosReliability
+from rosbags.interfaces import (
+    Connection,
+    ConnectionExtRosbag2,
+    QosDurability,
+    QosReliability,
+)
 from rosbags.rosbag2 import Reader
-from rosbags.typesys import get_typestore, Stores
-
-TYPES = get_typestore(Stores.ROS2_JAZZY)
 
 
 @dataclass(frozen=True)
@@ -22,8 +27,8 @@ class BagTopic:
     One topic of a bag.
 
     :ivar type_name: such as sensor_msgs/msg/Image.
-    :ivar latched: True where its publisher kept messages for late subscribers.
-    :ivar reliable: False where its publisher offered best effort.
+    :ivar latched: True if its publisher kept messages for late subscribers.
+    :ivar reliable: False if its publisher offered best effort.
     """
 
     name: str
@@ -35,35 +40,35 @@ class BagTopic:
 
 @dataclass(frozen=True)
 class BagMessage:
-    """One message: `data` is CDR as it was recorded, `time_ns` when."""
+    """One message: `data` is CDR as recorded, `time_ns` the time of recording."""
 
     topic: BagTopic
     time_ns: int
     data: bytes
 
-    def read(self, path):
+    def read(self, path: str | Path) -> Any:
         """Return the deserialized message; `path` names the bag in the error."""
         try:
             return TYPES.deserialize_cdr(self.data, self.topic.type_name)
-        # The bytes are a stranger's, and rosbags fails on them in many ways.
+        # On damaged bytes rosbags raises almost anything.
         except Exception:
             raise HoocError(f'{path}: a message of {self.topic.name} is damaged or not of type '
                             f'{self.topic.type_name}; record or copy the bag again') from None
 
 
-def topics(path):
+def topics(path: str | Path) -> dict[str, BagTopic]:
     """Return {topic name: BagTopic} of a bag."""
     with _reading(path) as reader:
         return {connection.topic: _topic(connection) for connection in reader.connections}
 
 
-def iter_messages(path, names=None):
+def iter_messages(path: str | Path, names: Collection[str] | None = None) -> Iterator[BagMessage]:
     """
     Yield every BagMessage of a bag in the order of time.
 
     :param path: a rosbag2 folder, or its .mcap or .db3 file.
     :param names: topic names to keep, None = all.
-    :raises HoocError: where the bag is missing, truncated or no bag.
+    :raises HoocError: if the bag is missing, truncated or not a bag.
     """
     with _reading(path) as reader:
         chosen = [c for c in reader.connections if names is None or c.topic in names]
@@ -74,20 +79,20 @@ def iter_messages(path, names=None):
 
 
 @contextmanager
-def _reading(path):
-    """Open a bag; whatever rosbags raises on a stranger's bytes becomes a HoocError."""
+def _reading(path: str | Path) -> Iterator[Reader]:
+    """Open a bag; whatever rosbags raises on damaged bytes becomes a HoocError."""
     path = Path(path)
     if not path.exists():
         raise HoocError(f'{path}: there is no such bag; give a rosbag2 folder or an .mcap file')
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
-        raise HoocError(f'{path}: metadata.yaml is missing, so this is no rosbag2 folder or its '
-                        'recording was cut off; run "ros2 bag reindex" or record again')
+        raise HoocError(f'{path}: metadata.yaml is missing, so this is not a rosbag2 folder or '
+                        'its recording was interrupted; run "ros2 bag reindex" or record again')
     if path.is_dir():
-        # Size and depth are bounded here; rosbags would take anything.
+        # Size and depth of the YAML are bounded here; rosbags has no limits.
         _check_compression(path, files.read_yaml(path / 'metadata.yaml'))
     for file in path.glob('*.mcap') if path.is_dir() else [path]:
         if file.suffix == '.mcap' and file.is_file():
-            mcap_file.check(file)
+            check_mcap(file)
     try:
         with Reader(path) as reader:
             yield reader
@@ -95,12 +100,12 @@ def _reading(path):
         raise
     except Exception as error:
         reason = ' '.join(str(error).split())[:160] or type(error).__name__
-        raise HoocError(f'{path}: the bag is truncated, damaged or no bag ({reason}); '
+        raise HoocError(f'{path}: the bag is truncated, damaged or not a bag ({reason}); '
                         'copy it again, or save what is left with hooc doctor --salvage') from None
 
 
-def _check_compression(path, metadata):
-    """Refuse whole files and single messages that are compressed: their size has no bound."""
+def _check_compression(path: Path, metadata: dict[str, Any]) -> None:
+    """Reject compression of whole files or single messages: their size has no bound."""
     info = metadata.get('rosbag2_bagfile_information')
     mode = str(info.get('compression_mode') or '').lower() if isinstance(info, dict) else ''
     if mode not in ('', 'none', 'storage'):
@@ -108,8 +113,9 @@ def _check_compression(path, metadata):
                         'convert" (MCAP with its own compression is read)')
 
 
-def _topic(connection):
+def _topic(connection: Connection) -> BagTopic:
     """Return the BagTopic of a rosbags connection; unknown QoS counts as reliable."""
+    assert isinstance(connection.ext, ConnectionExtRosbag2)
     profiles = connection.ext.offered_qos_profiles
     return BagTopic(
         connection.topic, connection.msgtype, connection.msgcount,

@@ -1,52 +1,42 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Record messages as they come off the wire, as a rosbag2 bag."""
+"""Record serialized messages as a rosbag2 bag."""
 
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
-from hooc_perception.io.bags import mcap_file
-from hooc_perception.io.bags.writer import STORAGES
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from hooc_perception.io.bags.bag_format import METADATA_VERSION, offered_qos, STORAGES, TYPES
+from hooc_perception.io.bags.mcap_checks import write_checksums
+from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Writer
-from rosbags.typesys import get_typestore, Stores
-
-_TYPES = get_typestore(Stores.ROS2_JAZZY)
-_INFINITE = QosTime(9223372036, 854775807)
 
 
 class RawBagWriter:
     """Write serialized messages; use as a context manager."""
 
-    def __init__(self, path, storage='mcap'):
-        """Create the bag; HoocError where there is one already."""
+    def __init__(self, path: str | Path, storage: str = 'mcap') -> None:
+        """Create the bag; raise HoocError if it exists."""
         path = Path(path)
         if path.exists():
             raise HoocError(f'{path}: exists already; remove it or choose another folder')
         path.parent.mkdir(parents=True, exist_ok=True)
         self._path = path / f'{path.name}.mcap'
-        self._writer = Writer(path, version=9, storage_plugin=STORAGES[storage])
+        self._writer = Writer(path, version=METADATA_VERSION, storage_plugin=STORAGES[storage])
         self._writer.open()
-        self._connections = {}
+        self._connections: dict[str, Connection] = {}
 
-    def __enter__(self):
+    def __enter__(self) -> 'RawBagWriter':
         """Return the writer."""
         return self
 
-    def __exit__(self, *_):
+    def __exit__(self, *_: object) -> None:
         """Finish the bag."""
         self._writer.close()
         if self._path.is_file():
-            mcap_file.seal(self._path)
+            write_checksums(self._path)
 
-    def write(self, topic, type_name, data, time_ns, latched=False):
+    def write(self, topic: str, type_name: str, data: bytes, time_ns: int,
+              latched: bool = False) -> None:
         """
         Add one message.
 
@@ -55,8 +45,5 @@ class RawBagWriter:
         """
         if topic not in self._connections:
             self._connections[topic] = self._writer.add_connection(
-                topic, type_name, typestore=_TYPES, offered_qos_profiles=[Qos(
-                    QosHistory.KEEP_LAST, 1 if latched else 10, QosReliability.RELIABLE,
-                    QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE,
-                    _INFINITE, _INFINITE, QosLiveliness.AUTOMATIC, _INFINITE, False)])
+                topic, type_name, typestore=TYPES, offered_qos_profiles=[offered_qos(latched)])
         self._writer.write(self._connections[topic], time_ns, data)

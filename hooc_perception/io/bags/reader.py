@@ -1,74 +1,85 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Read one frame set from a bag: those of `hooc convert`, and recordings of other people.
+Read one frame set from a bag: a bag of `hooc convert` or a recording from elsewhere.
 
-In a stranger's bag the depth topics are found by type and encoding, a camera's calibration
-beside its image, and its pose in extrinsics topics or /tf_static. Where no frame is known to be
-a table's, it is estimated from the depth.
+In other recordings, the depth topics are found by type and encoding, a camera's calibration
+beside its image, and its pose in extrinsics topics or /tf_static. If no frame is known to be a
+table's, it is estimated from the depth.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-from hooc_perception.core.types import DepthView
+from hooc_perception.core.arrays import Float64Array, UInt8Array
+from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.camera_topics import (
     camera_from_info,
     cameras_without_depth,
     depth_topics,
 )
+from hooc_perception.io.bags.contents import read_contents
 from hooc_perception.io.bags.files import BagMessage, BagTopic, iter_messages, topics
 from hooc_perception.io.bags.frames import FrameTree, plain
-from hooc_perception.io.bags.scene_info import default_info, parsed_info, SUFFIX
 from hooc_perception.io.depth_encodings import decode_depth, decode_image
-from hooc_perception.io.scenes.support_plane import estimate_table_frame
+from hooc_perception.io.scenes.scene import TrueObject
+from hooc_perception.io.scenes.table_frame import TableFrameScene
 import numpy as np
 
 __all__ = ['BagMessage', 'BagScene', 'BagTopic', 'iter_messages', 'topics']
 
 TABLE_FRAME = 'table'
-TRANSFORM = 'geometry_msgs/msg/TransformStamped'
-TF = 'tf2_msgs/msg/TFMessage'
 
 
-class BagScene:
+class BagScene(TableFrameScene):
     """
     One frame set of a bag, with the interface of RecordedScene.
 
     :ivar path: the bag.
     :ivar topics: {name: BagTopic}.
     :ivar depth_topics: {camera name: image topic}, in camera order.
-    :ivar info: what /hooc/scene_info holds (dataset, scene, categories, max_instances, truth,
-        world_frame, ...); its defaults where a bag has none.
-    :ivar name: the scene's name, the bag's where it has none.
+    :ivar info: content of /hooc/scene_info (dataset, scene, categories, max_instances, truth,
+        world_frame, ...); defaults if a bag has none.
+    :ivar name: the scene's name; the bag's if it has none.
+    :ivar table_known: whether the world frame is known to be a table's.
     """
 
-    def __init__(self, path, world_frame=None):
+    def __init__(self, path: str | Path, world_frame: str | None = None) -> None:
         """
-        Read all but the images.
+        Read everything but the images.
 
         :param path: a rosbag2 folder, or its .mcap or .db3 file.
         :param world_frame: a frame of the bag with z up and z = 0 on the table top; None takes
             that of scene_info, else `table`, else estimates it from the depth.
-        :raises HoocError: where the bag is damaged, has no depth, or lacks a calibration.
+        :raises HoocError: if the bag is damaged, has no depth, or lacks a calibration.
         """
         self.path = Path(path)
-        self.topics = topics(path)
-        self._tree, infos, self.info, firsts = self._read_small_topics()
-        self.name = self.info['scene']
-        self.depth_topics = self._in_camera_order(depth_topics(firsts, self.path))
-        frames = {}
-        cameras = []
-        for name, topic in self.depth_topics.items():
-            cameras.append(camera_from_info(name, topic, infos, firsts[topic], self.path))
-            frames[name] = firsts[topic].header.frame_id
-        self._source_cameras = self._posed(cameras, frames, world_frame)
+        contents = read_contents(self.path)
+        self.topics: dict[str, BagTopic] = contents.topics
+        self.info: dict[str, Any] = contents.info
+        self.name: str = self.info['scene']
+        self.depth_topics: dict[str, str] = _in_camera_order(
+            depth_topics(contents.first_images, self.path), self.info['cameras'])
+        firsts = {name: contents.first_images[topic] for name, topic in self.depth_topics.items()}
+        self._start_ns = max(_stamp_ns(image.header) for image in firsts.values())
+        cameras = [camera_from_info(name, topic, contents.camera_infos, firsts[name], self.path)
+                   for name, topic in self.depth_topics.items()]
+        frames = {name: image.header.frame_id for name, image in firsts.items()}
+        wanted = self._wanted_world(contents.tree, world_frame)
+        self.table_known: bool = wanted is not None
+        world = plain(wanted or contents.tree.root(next(iter(frames.values()))))
+        self.source_cameras: tuple[Camera, ...] = tuple(
+            replace(camera, T_world_camera=self._pose(contents.tree, world, camera.name,
+                                                      frames[camera.name]))
+            for camera in cameras)
 
     @property
-    def incomplete(self):
-        """Say of which cameras the bag holds no depth image, None where there is none."""
+    def incomplete(self) -> str | None:
+        """Return a sentence that names the cameras without any depth image, None for none."""
         names = cameras_without_depth(self.topics, self.depth_topics, self.info['cameras'])
         if not names:
             return None
@@ -77,59 +88,38 @@ class BagScene:
                 f'{", ".join(self.depth_topics)} will be used; record its depth topic, too')
 
     @property
-    def table_known(self):
-        """Say whether the world frame is known to be a table's."""
-        return self._table_known
-
-    @cached_property
-    def table(self):
-        """Return the SupportPlane that was estimated, None where the world is a table's."""
-        if self._table_known:
-            return None
-        return estimate_table_frame(self._source_views, self.name)
-
-    @cached_property
-    def cameras(self):
-        """Return the tuple of Camera, posed in the table's frame."""
-        if self._table_known:
-            return self._source_cameras
-        return tuple(replace(c, T_world_camera=self.table.T_table_source @ c.T_world_camera)
-                     for c in self._source_cameras)
-
-    @property
-    def world(self):
-        """Return what a results file says of an estimated world frame, {} where it is known."""
-        return {} if self._table_known else {'world': self.table.as_dict()}
-
-    @property
-    def truth(self):
-        """Return the tuple of TrueObject, None where the bag holds none."""
+    def truth(self) -> tuple[TrueObject, ...] | None:
+        """Return the ground truth objects, None if the bag has none."""
         return self.info['truth']
 
     @property
-    def source_truth(self):
+    def source_truth(self) -> tuple[TrueObject, ...] | None:
         """Return the same: a bag's truth is already in the frame of its table."""
         return self.truth
 
-    def views(self, images=None):
+    def views(self, images: Mapping[str, int] | None = None) -> tuple[DepthView, ...]:
         """
-        Return the tuple of DepthView of one frame set, in camera order.
+        Return the DepthViews of one frame set, in camera order.
 
-        :param images: {camera: which of its images, from 0 on}; an image without a reading
-            stands for the next one. None takes the first moment when every camera has an image;
-            each one's nearest counts.
-        :raises HoocError: where an image is damaged or holds no reading.
+        :param images: {camera: which of its images, from 0 on}; an image without a reading is
+            replaced by the next one. None takes the first moment at which every camera has an
+            image, and each camera's image nearest to it.
+        :raises HoocError: if an image is damaged or holds no reading.
         """
-        chosen = self._source_views if images is None else self._views_of(images)
+        chosen = self._first_views if images is None else self._views_of(images)
         return tuple(replace(view, camera=camera)
                      for view, camera in zip(chosen, self.cameras))
 
-    def depth(self):
-        """Return the tuple of DepthView of the first frame set."""
+    def depth(self) -> tuple[DepthView, ...]:
+        """Return the DepthViews of the first frame set."""
         return self.views()
 
-    def labels(self):
-        """Return {camera: (H, W) uint8 instance labels}, None where the bag holds none."""
+    def source_views(self) -> tuple[DepthView, ...]:
+        """Return the DepthViews of the first frame set with the cameras of the source world."""
+        return self._first_views
+
+    def labels(self) -> dict[str, UInt8Array] | None:
+        """Return {camera: (H, W) uint8 instance labels}, None if the bag holds none."""
         wanted = {self._sibling(name, 'instance_labels'): name for name in self.depth_topics}
         result = {}
         for message in iter_messages(self.path, set(wanted)):
@@ -142,11 +132,12 @@ class BagScene:
         return result or None
 
     @cached_property
-    def _source_views(self):
-        """Return the frame set with the cameras as the bag has them."""
-        names = {topic: i for i, topic in enumerate(self.depth_topics.values())}
-        start = max(_stamp_ns(image.header) for image in self._firsts.values())
-        nearest, passed = {}, set()
+    def _first_views(self) -> tuple[DepthView, ...]:
+        """Return the first frame set with the cameras of the source world."""
+        names = tuple(self.depth_topics.values())
+        start = self._start_ns
+        nearest: dict[str, tuple[int, Any]] = {}
+        passed = set()
         for message in iter_messages(self.path, set(names)):
             topic = message.topic.name
             if topic in passed:
@@ -160,13 +151,13 @@ class BagScene:
             if len(passed) == len(names):
                 break
         return tuple(self._view(camera, topic, nearest[topic][1])
-                     for camera, topic in zip(self._source_cameras, names))
+                     for camera, topic in zip(self.source_cameras, names))
 
-    def _views_of(self, images):
-        """Return the DepthViews of images that are counted by camera, cameras as in the bag."""
-        cameras = {self.depth_topics[camera.name]: camera for camera in self._source_cameras}
+    def _views_of(self, images: Mapping[str, int]) -> tuple[DepthView, ...]:
+        """Return the DepthViews of images counted per camera, cameras of the source world."""
+        cameras = {self.depth_topics[camera.name]: camera for camera in self.source_cameras}
         left = {topic: images[camera.name] for topic, camera in cameras.items()}
-        views = {}
+        views: dict[str, DepthView] = {}
         for message in iter_messages(self.path, set(left)):
             topic = message.topic.name
             left[topic] -= 1
@@ -178,9 +169,10 @@ class BagScene:
                 continue        # ingestion has dropped it, too
             if len(views) == len(cameras):
                 return tuple(views[topic] for topic in cameras)
-        raise HoocError(f'{self.path}: it holds no such frame set')
+        raise HoocError(f'{self.path}: there is no such frame set in the bag; choose earlier '
+                        'images')
 
-    def _view(self, camera, topic, image):
+    def _view(self, camera: Camera, topic: str, image: Any) -> DepthView:
         """Return the DepthView of an image message."""
         try:
             depth = decode_depth(image.data, image.height, image.width, image.encoding,
@@ -193,77 +185,39 @@ class BagScene:
                             f'{camera.height}; correct the driver')
         if not np.isfinite(depth).any():
             raise HoocError(f'{self.path}: {topic} holds no reading in its first image; '
-                            'record again')
+                            'record it again')
         return DepthView(camera, depth)
 
-    def _read_small_topics(self):
-        """Return (FrameTree, {topic: CameraInfo}, info, {topic: first depth-like Image})."""
-        wanted = {topic.name for topic in self.topics.values() if topic.type_name in (
-            'sensor_msgs/msg/CameraInfo', TRANSFORM, TF) and topic.name != '/tf'}
-        wanted |= {name for name, topic in self.topics.items()
-                   if name.endswith(SUFFIX) and topic.type_name == 'std_msgs/msg/String'}
-        tree, infos, info = FrameTree(), {}, {}
-        for message in iter_messages(self.path, wanted):
-            topic = message.topic
-            if topic.type_name == 'sensor_msgs/msg/CameraInfo':
-                if topic.name not in infos:
-                    infos[topic.name] = message.read(self.path)
-            elif topic.name.endswith(SUFFIX):
-                info = parsed_info(message.read(self.path).data, f'{self.path}: {topic.name}')
-            else:
-                content = message.read(self.path)
-                for stamped in getattr(content, 'transforms', None) or [content]:
-                    tree.add(stamped, f'{self.path}: {topic.name}')
-        self._firsts = self._first_images()
-        return tree, infos, {**default_info(self.path.resolve().stem), **info}, self._firsts
-
-    def _first_images(self):
-        """Return {topic: its first Image message}."""
-        left = {topic.name for topic in self.topics.values()
-                if topic.type_name == 'sensor_msgs/msg/Image' and topic.count}
-        firsts = {}
-        for message in iter_messages(self.path, set(left)):
-            if message.topic.name in left:
-                firsts[message.topic.name] = message.read(self.path)
-                left.discard(message.topic.name)
-                if not left:
-                    break
-        return firsts
-
-    def _in_camera_order(self, found):
-        """Return {camera: topic} in the order of scene_info; keep only those images."""
-        order = self.info['cameras']
-        found = dict(sorted(found.items(), key=lambda item: (
-            order.index(item[0]) if item[0] in order else len(order), item[0])))
-        self._firsts = {topic: self._firsts[topic] for topic in found.values()}
-        return found
-
-    def _sibling(self, camera_name, name):
+    def _sibling(self, camera_name: str, name: str) -> str:
         """Return the topic `name` of a camera: beside the folder of its depth image."""
         return f'{self.depth_topics[camera_name].rsplit("/", 2)[0]}/{name}'
 
-    def _posed(self, cameras, frames, world_frame):
-        """Return the cameras with their poses; note whether the world is known to be a table's."""
+    def _wanted_world(self, tree: FrameTree, world_frame: str | None) -> str | None:
+        """Return the name of the frame that is a table's, None if none is known to be."""
         wanted = world_frame or self.info['world_frame']
-        if wanted and plain(wanted) not in self._tree:
+        if wanted and plain(wanted) not in tree:
             raise HoocError(f'{self.path}: no transform names the world frame {wanted!r}; '
                             'record /tf_static or name another frame')
-        if not wanted and TABLE_FRAME in self._tree:
+        if not wanted and TABLE_FRAME in tree:
             wanted = TABLE_FRAME
-        self._table_known = wanted is not None
-        world = plain(wanted or self._tree.root(next(iter(frames.values()))))
-        posed = []
-        for camera in cameras:
-            T_world_camera = self._tree.transform(world, frames[camera.name])
-            if T_world_camera is None:
-                raise HoocError(
-                    f'{self.path}: nothing connects camera {camera.name} (frame '
-                    f'{frames[camera.name]!r}) with {world!r}; record /tf_static or '
-                    f'{self._sibling(camera.name, "extrinsics")} too')
-            posed.append(replace(camera, T_world_camera=T_world_camera))
-        return tuple(posed)
+        return wanted
+
+    def _pose(self, tree: FrameTree, world: str, camera_name: str, frame: str) -> Float64Array:
+        """Return T_world_camera (4, 4) of the camera whose images are in `frame`."""
+        T_world_camera = tree.transform(world, frame)
+        if T_world_camera is None:
+            raise HoocError(f'{self.path}: nothing connects camera {camera_name} (frame '
+                            f'{frame!r}) with {world!r}; record /tf_static or '
+                            f'{self._sibling(camera_name, "extrinsics")} too')
+        return T_world_camera
 
 
-def _stamp_ns(header):
+def _in_camera_order(found: Mapping[str, str], order: Sequence[str]) -> dict[str, str]:
+    """Return {camera: topic} in the order of scene_info, unlisted cameras last."""
+    return dict(sorted(found.items(), key=lambda item: (
+        order.index(item[0]) if item[0] in order else len(order), item[0])))
+
+
+def _stamp_ns(header: Any) -> int:
     """Return a header's stamp in nanoseconds."""
     return header.stamp.sec * 10 ** 9 + header.stamp.nanosec

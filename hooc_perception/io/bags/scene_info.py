@@ -1,35 +1,38 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Read what a bag says of its scene, on /hooc/scene_info."""
+"""Read the description of a bag's scene, on /hooc/scene_info."""
 
+from collections.abc import Callable
 import json
+from typing import Any
 
 from hooc_perception.errors import HoocError
-from hooc_perception.io.scenes import files
+from hooc_perception.io.scenes import fields
+from hooc_perception.io.scenes.scene import TrueObject
 from hooc_perception.io.scenes.truth import true_object
 
 SUFFIX = '/scene_info'
-# As the nodes have it: what the model says.
+# The value by which the nodes mean the limit of the model.
 MODELS_LIMIT = -1
 
 
-def default_info(name):
-    """Return what holds for a bag that says nothing; `name` is the bag's."""
+def default_info(name: str) -> dict[str, Any]:
+    """Return the description of a bag without one; `name` is the bag's."""
     return {'dataset': name, 'scene': name, 'categories': [], 'cameras': [],
             'max_instances': MODELS_LIMIT, 'truth': None, 'world_frame': None}
 
 
-def parsed_info(text, where):
+def parsed_info(text: str, where: str) -> dict[str, Any]:
     """
     Return the checked mapping of a scene_info message; truth as a tuple of TrueObject.
 
-    Keys that we do not know are kept; null stands for a key that is absent.
+    Unknown keys are kept; null means that a key is absent.
 
     :param where: names bag and topic in the error.
-    :raises HoocError: one sentence that names the key and the mend.
+    :raises HoocError: one sentence that names the key and the fix.
     """
     try:
-        info = files.mapping(json.loads(text), where)
+        info = fields.mapping(json.loads(text), where)
     except (ValueError, RecursionError):
         raise HoocError(f'{where} is not valid JSON; convert the scene again') from None
     info = {key: value for key, value in info.items() if value is not None}
@@ -39,19 +42,24 @@ def parsed_info(text, where):
     return info
 
 
-def _names(value, where):
-    """Return a list of names, none of them twice."""
-    return list(files.unique([files.name(item, where) for item in files.sequence(value, where)],
-                             where))
+def _names(value: object, where: str) -> list[str]:
+    """Return a list of distinct names."""
+    names = [fields.name(item, where) for item in fields.sequence(value, where)]
+    return list(fields.unique(names, where))
 
 
-def _truth(value, where):
-    """Return the tuple of TrueObject."""
+def _truth(value: object, where: str) -> tuple[TrueObject, ...]:
+    """Return the ground truth objects."""
     return tuple(true_object(entry, f'{where}[{i}]')
-                 for i, entry in enumerate(files.sequence(value, where)))
+                 for i, entry in enumerate(fields.sequence(value, where)))
 
 
-# A scene's name becomes that of its recording, in a folder of the user's.
-_CHECKS = {'dataset': files.name, 'scene': files.name, 'world_frame': files.text,
-           'cameras': _names, 'categories': _names, 'truth': _truth,
-           'max_instances': lambda value, where: files.whole(value, MODELS_LIMIT, 1000, where)}
+def _max_instances(value: object, where: str) -> int:
+    """Return the most objects of one category."""
+    return fields.integer(value, MODELS_LIMIT, 1000, where)
+
+
+# The scene's name is checked as a file name because its recording is named after it.
+_CHECKS: dict[str, Callable[[object, str], Any]] = {
+    'dataset': fields.name, 'scene': fields.name, 'world_frame': fields.text, 'cameras': _names,
+    'categories': _names, 'truth': _truth, 'max_instances': _max_instances}

@@ -2,65 +2,106 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write recorded scenes as rosbag2 bags (docs/bags.md)."""
 
+from collections.abc import Iterable, Iterator
 import json
 from pathlib import Path
 import shutil
 import tempfile
+from typing import Any, Protocol, TYPE_CHECKING
 
+from hooc_perception.core.arrays import UInt8Array
 from hooc_perception.core.geometry import pose_from_matrix
+from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
-from hooc_perception.io.bags import mcap_file
+from hooc_perception.io.bags.bag_format import (
+    CAMERA_INFO,
+    IMAGE,
+    METADATA_VERSION,
+    offered_qos,
+    STORAGES,
+    STRING,
+    TF,
+    TRANSFORM,
+    TYPES,
+)
+from hooc_perception.io.bags.mcap_checks import write_checksums
 from hooc_perception.io.depth_encodings import encode_depth, METRES, MILLIMETRES
+from hooc_perception.io.scenes.scene import TrueObject
 from hooc_perception.io.scenes.writer import true_object_entry
 import numpy as np
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
-from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import get_typestore, Stores
+from rosbags.interfaces import Qos
+from rosbags.rosbag2 import Writer
+
+if TYPE_CHECKING:
+    from hooc_perception.io.scenes.scene_set import SceneSet
 
 NAMESPACE = '/hooc'
 INFO_TOPIC = f'{NAMESPACE}/scene_info'
 INFO_FORMAT = 'hooc-scene-info/1'
-STORAGES = {'mcap': StoragePlugin.MCAP, 'sqlite3': StoragePlugin.SQLITE3}
-# Stamps are invented, since scene sets hold none: the same scene gives the same bag.
+# Scene sets have no stamps; fixed ones make the same scene give the same bag.
 FIRST_STAMP_NS = 1_000_000_000 * 10 ** 9
 # Latched topics come first, so that a player has sent them when the first image comes.
 LEAD_NS = 10 ** 8
 _SECOND_NS = 10 ** 9
-_INFINITE = QosTime(9223372036, 854775807)
-
-TYPES = get_typestore(Stores.ROS2_JAZZY)
-IMAGE = 'sensor_msgs/msg/Image'
-CAMERA_INFO = 'sensor_msgs/msg/CameraInfo'
-TRANSFORM = 'geometry_msgs/msg/TransformStamped'
-TF = 'tf2_msgs/msg/TFMessage'
-STRING = 'std_msgs/msg/String'
+# Topic, message type and message.
+_Outgoing = tuple[str, str, Any]
 
 
-def optical_frame(camera_name):
+class WritableScene(Protocol):
+    """What `write_bag` needs of a scene; RecordedScene is one."""
+
+    @property
+    def name(self) -> str:
+        """Return the scene's name."""
+        ...
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """Return the cameras, posed in the world frame."""
+        ...
+
+    @property
+    def depth_units(self) -> tuple[float, ...]:
+        """Return the metres per count of the recording, one per camera."""
+        ...
+
+    @property
+    def truth(self) -> tuple[TrueObject, ...] | None:
+        """Return the ground truth, None without annotation."""
+        ...
+
+    @property
+    def world(self) -> dict[str, Any]:
+        """Return the description of an estimated world frame, {} if it is known."""
+        ...
+
+    def depth(self) -> tuple[DepthView, ...]:
+        """Return one DepthView per camera."""
+        ...
+
+    def labels(self) -> dict[str, UInt8Array] | None:
+        """Return {camera: (H, W) uint8 instance labels}, None without labels."""
+        ...
+
+
+def optical_frame(camera_name: str) -> str:
     """Return the name of a camera's optical frame."""
     return f'{camera_name}_depth_optical_frame'
 
 
-def write_bag(scene, scene_set, out_dir, storage='mcap', repeat=1, rate=10.0):
+def write_bag(scene: WritableScene, scene_set: 'SceneSet', out_dir: str | Path,
+              storage: str = 'mcap', repeat: int = 1, rate: float = 10.0) -> Path:
     """
     Write one scene as the bag out_dir/<scene> and return its path.
 
-    Depth in millimetres goes out as 16UC1, in another unit as 32FC1, so that nothing is
+    Depth in millimetres is written as 16UC1, in another unit as 32FC1, so that nothing is
     rounded and a bag parses to the same objects as its scene set.
 
-    :param scene: RecordedScene, or anything with its name, cameras, depth(), labels() and truth.
-    :param scene_set: SceneSet that the scene is of: name, categories, limits, world frame.
+    :param scene_set: the set of the scene: name, categories, limits, world frame.
     :param storage: 'mcap' or 'sqlite3'.
     :param repeat: number of frame sets; the same images each time, with new stamps.
-    :param rate: frame sets a second.
-    :raises HoocError: where the bag exists already or the scene cannot be read.
+    :param rate: frame sets per second.
+    :raises HoocError: if the bag exists already or the scene cannot be read.
     """
     if storage not in STORAGES:
         raise HoocError(f'storage is {storage!r}; choose one of {", ".join(STORAGES)}')
@@ -83,8 +124,8 @@ def write_bag(scene, scene_set, out_dir, storage='mcap', repeat=1, rate=10.0):
     return path
 
 
-def scene_info(scene, scene_set):
-    """Return the dict that /hooc/scene_info holds as JSON."""
+def scene_info(scene: WritableScene, scene_set: 'SceneSet') -> dict[str, Any]:
+    """Return the dict that /hooc/scene_info carries as JSON."""
     truth = scene.truth
     return {'format': INFO_FORMAT, 'dataset': scene_set.name, 'scene': scene.name,
             'world_frame': scene_set.world_frame, 'depth_unit': 0.001,
@@ -95,30 +136,31 @@ def scene_info(scene, scene_set):
             **scene.world}
 
 
-def _write(path, storage, latched, images, repeat, rate):
+def _write(path: Path, storage: str, latched: Iterable[_Outgoing], images: Iterable[_Outgoing],
+           repeat: int, rate: float) -> None:
     """Write all messages in the order of time."""
-    with Writer(path, version=9, storage_plugin=STORAGES[storage]) as writer:
+    with Writer(path, version=METADATA_VERSION, storage_plugin=STORAGES[storage]) as writer:
         connections = {}
 
-        def write(topic, kind, message, stamp_ns, qos):
+        def write(topic: str, kind: str, message: Any, stamp_ns: int, qos: Qos) -> None:
             if topic not in connections:
                 connections[topic] = writer.add_connection(
                     topic, kind, typestore=TYPES, offered_qos_profiles=[qos])
             writer.write(connections[topic], stamp_ns, TYPES.serialize_cdr(message, kind))
 
         for topic, kind, message in latched:
-            write(topic, kind, message, FIRST_STAMP_NS, _qos(latched=True))
+            write(topic, kind, message, FIRST_STAMP_NS, offered_qos(latched=True))
         for i in range(repeat):
             stamp_ns = FIRST_STAMP_NS + LEAD_NS + round(i * _SECOND_NS / rate)
             for topic, kind, message in images:
                 message.header.stamp = _time(stamp_ns)
-                write(topic, kind, message, stamp_ns, _qos(latched=False))
+                write(topic, kind, message, stamp_ns, offered_qos(latched=False))
     if storage == 'mcap':
-        mcap_file.seal(path / f'{path.name}.mcap')
+        write_checksums(path / f'{path.name}.mcap')
 
 
-def _latched(scene, scene_set):
-    """Yield (topic, type, message) of what is sent once and kept."""
+def _latched(scene: WritableScene, scene_set: 'SceneSet') -> Iterator[_Outgoing]:
+    """Yield the messages on latched topics, which are sent once."""
     types = TYPES.types
     transforms = [_transform(camera, scene_set.world_frame) for camera in scene.cameras]
     yield INFO_TOPIC, STRING, types[STRING](json.dumps(scene_info(scene, scene_set)))
@@ -130,8 +172,8 @@ def _latched(scene, scene_set):
                _image(labels.tobytes(), labels.shape, 'mono8', labels.shape[1], camera))
 
 
-def _images(scene):
-    """Yield (topic, type, message) of one frame set: every image and its CameraInfo."""
+def _images(scene: WritableScene) -> Iterator[_Outgoing]:
+    """Yield the messages of one frame set: every image and its CameraInfo."""
     for view, unit in zip(scene.depth(), scene.depth_units):
         topic = f'{NAMESPACE}/{view.camera.name}/depth'
         yield f'{topic}/camera_info', CAMERA_INFO, _camera_info(view.camera)
@@ -141,14 +183,15 @@ def _images(scene):
                _image(data, view.depth.shape, encoding, step, view.camera.name))
 
 
-def _image(data, shape, encoding, step, camera_name):
+def _image(data: bytes, shape: tuple[int, ...], encoding: str, step: int,
+           camera_name: str) -> Any:
     """Return an Image message."""
     return TYPES.types[IMAGE](_header(optical_frame(camera_name)), *shape, encoding, 0, step,
                               np.frombuffer(data, np.uint8))
 
 
-def _camera_info(camera):
-    """Return the CameraInfo of a Camera: raw, so K and D; what P says has no skew."""
+def _camera_info(camera: Camera) -> Any:
+    """Return the CameraInfo of a raw camera: K, D, and a P without skew."""
     types = TYPES.types
     P = np.zeros((3, 4))
     P[:, :3] = camera.K
@@ -161,7 +204,7 @@ def _camera_info(camera):
         roi=types['sensor_msgs/msg/RegionOfInterest'](0, 0, 0, 0, False))
 
 
-def _transform(camera, world_frame):
+def _transform(camera: Camera, world_frame: str) -> Any:
     """Return the TransformStamped world -> optical frame of a camera."""
     types = TYPES.types
     translation, rotation = pose_from_matrix(camera.T_world_camera)
@@ -172,18 +215,11 @@ def _transform(camera, world_frame):
             types['geometry_msgs/msg/Quaternion'](*rotation.tolist())))
 
 
-def _header(frame_id, stamp_ns=FIRST_STAMP_NS):
+def _header(frame_id: str, stamp_ns: int = FIRST_STAMP_NS) -> Any:
     """Return a Header."""
     return TYPES.types['std_msgs/msg/Header'](_time(stamp_ns), frame_id)
 
 
-def _time(stamp_ns):
+def _time(stamp_ns: int) -> Any:
     """Return a Time message."""
     return TYPES.types['builtin_interfaces/msg/Time'](*divmod(stamp_ns, _SECOND_NS))
-
-
-def _qos(latched):
-    """Return the profile of a latched topic, or that of the images: reliable, volatile."""
-    return Qos(QosHistory.KEEP_LAST, 1 if latched else 10, QosReliability.RELIABLE,
-               QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE,
-               _INFINITE, _INFINITE, QosLiveliness.AUTOMATIC, _INFINITE, False)

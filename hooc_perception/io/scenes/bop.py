@@ -3,55 +3,62 @@
 """
 Read BOP datasets (Benchmark for 6D Object Pose Estimation) as scene sets.
 
-BOP's millimetres become metres, its poses those of the models' bounding-box centres. Images of
-one scene folder that know their pose in a common world become the views of one scene; an image
+BOP's millimetres become metres, and its poses become those of the models' bounding-box centres.
+Images of one scene folder with poses in a common world become the views of one scene; an image
 without extrinsics is a scene of its own. The table frame is estimated (support_plane.py).
 """
 
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 import re
+from typing import Any
 
 from hooc_perception.chain import check_categories
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import inverse, pose_from_matrix
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
-from hooc_perception.io.scenes import camera_files, files, png
+from hooc_perception.io.scenes import camera_files, fields, files, png
 from hooc_perception.io.scenes.nominal_table import nominal_cameras
 from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
 from hooc_perception.objects.mesh import mesh_box
 import numpy as np
 
 MM = 0.001
-# Recordings by a moving camera hold hundreds of images; these many, evenly spread, are taken.
+# A recording by a moving camera has hundreds of images; this many, evenly spread, are used.
 MAX_VIEWS = 16
 _MODEL_FOLDERS = ('models', 'models_cad', 'models_reconst', 'models_eval')
 _SCENE = re.compile(r'\d{6}\Z')
 _MODEL = re.compile(r'obj_(\d{6})\.ply\Z')
+# Image id, its entry of scene_camera.json, name of its camera.
+_Shot = tuple[str, dict[str, Any], str]
 
 
-def is_bop(path):
-    """Say whether a folder is laid out as a BOP dataset."""
+def is_bop(path: Path) -> bool:
+    """Return whether a folder has the layout of a BOP dataset."""
     return bool(_splits(path)) and any((path / folder).is_dir() for folder in _MODEL_FOLDERS)
 
 
-def load_bop(path, with_scenes=True):
+def load_bop(path: Path, with_scenes: bool = True) -> tuple[
+        str, tuple[Category, ...], tuple[Camera, ...], tuple[RecordedScene, ...]]:
     """
     Return (name, categories, cameras, scenes) of a BOP dataset's test split.
 
-    Category names are those in models_info.json where it has any, else obj_000001 and so on.
+    Category names come from models_info.json if it has any, else they are obj_000001 and so on.
     The cameras are those of the first scene.
 
-    :param with_scenes: False opens nothing of the scenes but scene_camera.json; their cameras
-        then stand above a nominal table, and there are no scenes.
-    :raises HoocError: one sentence that names file, field and mend.
+    :param with_scenes: False opens only scene_camera.json of the scenes; the cameras are then
+        placed above a nominal table, and there are no scenes.
+    :raises HoocError: one sentence that names file, field and fix.
     """
     models = next(path / folder for folder in _MODEL_FOLDERS if (path / folder).is_dir())
     info_file = models / 'models_info.json'
     info = files.read_json(info_file) if info_file.is_file() else {}
     categories = _categories(models, info_file, info)
-    name = files.name(path.resolve().name, f'{path}: its name')
+    name = fields.name(path.resolve().name, f'{path}: its name')
     boxes = _Boxes(categories, info_file, info)
     split = _splits(path)[0]
-    scenes = []
+    scenes: list[RecordedScene] = []
     for folder in sorted(p for p in split.iterdir() if p.is_dir() and _SCENE.match(p.name)):
         if with_scenes:
             scenes += _scenes(folder, categories, boxes)
@@ -64,13 +71,13 @@ def load_bop(path, with_scenes=True):
     return name, tuple(categories.values()), scenes[0].cameras, tuple(scenes)
 
 
-def _splits(path):
-    """Return the folders that may hold scenes to test on, the most usual first."""
+def _splits(path: Path) -> list[Path]:
+    """Return the folders that may hold test scenes, the most common name first."""
     return sorted((p for p in path.iterdir() if p.is_dir() and
                    p.name.split('_')[0] in ('test', 'val')), key=lambda p: (len(p.name), p.name))
 
 
-def _categories(models, info_file, info):
+def _categories(models: Path, info_file: Path, info: dict[str, Any]) -> dict[int, Category]:
     """Return {obj_id: Category}, by ascending id."""
     ids = sorted(int(match[1]) for match in map(_MODEL.match, (p.name for p in models.iterdir()))
                  if match)
@@ -79,25 +86,26 @@ def _categories(models, info_file, info):
                         'give 1 to 255')
     result = {}
     for obj_id in ids:
-        entry = files.mapping(info.get(str(obj_id), {}), f'{info_file}: {obj_id}')
-        name = files.name(entry.get('name', f'obj_{obj_id:06d}'), f'{info_file}: {obj_id} name')
+        entry = fields.mapping(info.get(str(obj_id), {}), f'{info_file}: {obj_id}')
+        name = fields.name(entry.get('name', f'obj_{obj_id:06d}'), f'{info_file}: {obj_id} name')
         result[obj_id] = Category(name, models / f'obj_{obj_id:06d}.ply', MM)
-    check_categories(files.unique([category.name for category in result.values()],
+    check_categories(fields.unique([category.name for category in result.values()],
                                   f'{info_file}: name'), info_file)
     return result
 
 
-def _groups(folder):
-    """Return [(scene name, [(image id, entry of scene_camera.json, camera name)])]."""
+def _groups(folder: Path) -> list[tuple[str, list[_Shot]]]:
+    """Return [(scene name, its shots)] of a scene folder."""
     file = folder / 'scene_camera.json'
     shots = files.read_json(file)
     for key in shots:
         if not key.isdecimal():
-            raise HoocError(f'{file}: the image id {files.shown(key)} is not a number; '
+            raise HoocError(f'{file}: the image id {fields.short_repr(key)} is not a number; '
                             'correct it')
-    shared, groups = [], []
+    shared: list[_Shot] = []
+    groups: list[tuple[str, list[_Shot]]] = []
     for key in sorted(shots, key=int):
-        shot = files.mapping(shots[key], f'{file}: {key}')
+        shot = fields.mapping(shots[key], f'{file}: {key}')
         if 'cam_R_w2c' in shot and 'cam_t_w2c' in shot:
             shared.append((key, shot, f'view_{int(key):06d}'))
         else:
@@ -108,8 +116,9 @@ def _groups(folder):
     return groups
 
 
-def _scenes(folder, categories, boxes):
-    """Return the list of Scenes that one BOP scene folder holds."""
+def _scenes(folder: Path, categories: Mapping[int, Category],
+            boxes: '_Boxes') -> list[RecordedScene]:
+    """Return the scenes of one BOP scene folder."""
     truth_file = folder / 'scene_gt.json'
     truths = files.read_json(truth_file) if truth_file.is_file() else {}
     scenes = []
@@ -121,33 +130,36 @@ def _scenes(folder, categories, boxes):
     return scenes
 
 
-def _camera(path, folder, key, shot, name):
-    """Return the Camera in the source world without a look at its image."""
+def _camera(path: Path, folder: Path, key: str, shot: dict[str, Any], name: str) -> Camera:
+    """Return the Camera in the source world without reading its image."""
     where = f'{folder / "scene_camera.json"}: {key}'
     file = path / 'camera.json'
     entry = files.read_json(file) if file.is_file() else {}
-    K = files.numbers(files.required(shot, 'cam_K', where), 9, f'{where} cam_K')
-    # Who does not say how large the images are has their centre near the middle.
+    K = fields.numbers(fields.required(shot, 'cam_K', where), 9, f'{where} cam_K')
+    # Without a stated image size, the principal point is taken to be near the middle.
     width, height = (
-        files.whole(entry[side], 1, files.MAX_SIDE, f'{file}: {side}') if side in entry
-        else int(np.clip(2 * centre + 1, 1, files.MAX_SIDE).round())
+        fields.integer(entry[side], 1, fields.MAX_SIDE, f'{file}: {side}') if side in entry
+        else int(np.clip(2 * centre + 1, 1, fields.MAX_SIDE).round())
         for side, centre in (('width', K[2]), ('height', K[5])))
     return _posed_camera(shot, name, width, height, where)
 
 
-def _shot(folder, key, shot, name):
+def _shot(folder: Path, key: str, shot: dict[str, Any],
+          name: str) -> tuple[Camera, Path, float]:
     """Return (Camera in the source world, depth file, metres per count) of one image."""
     where = f'{folder / "scene_camera.json"}: {key}'
     file = folder / 'depth' / f'{int(key):06d}.png'
-    scale = files.number(shot.get('depth_scale', 1.0), f'{where} depth_scale')
+    scale = fields.number(shot.get('depth_scale', 1.0), f'{where} depth_scale')
     if not 1e-3 <= scale <= 100:
         raise HoocError(f'{where} depth_scale is {scale:g}; give the millimetres of one count')
-    return _posed_camera(shot, name, *png.png_size(file), where), file, scale * MM
+    width, height = png.png_size(file)
+    return _posed_camera(shot, name, width, height, where), file, scale * MM
 
 
-def _posed_camera(shot, name, width, height, where):
+def _posed_camera(shot: dict[str, Any], name: str, width: int, height: int,
+                  where: str) -> Camera:
     """Return the Camera of an entry of scene_camera.json."""
-    K = camera_files.intrinsics(files.required(shot, 'cam_K', where), width, height,
+    K = camera_files.intrinsics(fields.required(shot, 'cam_K', where), width, height,
                                 f'{where} cam_K')
     T_camera_world = np.eye(4)
     if 'cam_R_w2c' in shot:
@@ -155,21 +167,24 @@ def _posed_camera(shot, name, width, height, where):
     return Camera(name, width, height, K, np.zeros(5), inverse(T_camera_world))
 
 
-def _truth(truths, keys, cameras, file, categories, boxes):
-    """Return the tuple of TrueObject in the source world, None where nobody annotated."""
+def _truth(truths: dict[str, Any], keys: Sequence[str], cameras: Sequence[Camera], file: Path,
+           categories: Mapping[int, Category],
+           boxes: '_Boxes') -> tuple[TrueObject, ...] | None:
+    """Return the ground truth objects in the source world, None without annotation."""
     annotated = [i for i, key in enumerate(keys) if key in truths]
     if not annotated:
         return None
     # All images of a scene describe the same objects; some datasets leave out the hidden ones.
     best = max(annotated, key=lambda i: len(truths[keys[i]]))
     result = []
-    for i, item in enumerate(files.sequence(truths[keys[best]], f'{file}: {keys[best]}')):
+    for i, item in enumerate(fields.sequence(truths[keys[best]], f'{file}: {keys[best]}')):
         where = f'{file}: {keys[best]}[{i}]'
-        item = files.mapping(item, where)
-        obj_id = files.required(item, 'obj_id', where)
+        item = fields.mapping(item, where)
+        obj_id = fields.required(item, 'obj_id', where)
         if not isinstance(obj_id, int) or obj_id not in categories:
-            raise HoocError(f'{where} obj_id is {files.shown(obj_id)}, but no file models/obj_'
-                            '<6 digits>.ply has this id; add the model or correct the id')
+            raise HoocError(f'{where} obj_id is {fields.short_repr(obj_id)}, but no file '
+                            'models/obj_<6 digits>.ply has this id; add the model or correct the '
+                            'id')
         T_camera_model = _pose(item, 'cam_R_m2c', 'cam_t_m2c', where)
         centre, size = boxes.of(obj_id)
         T_model_centre = np.eye(4)
@@ -180,9 +195,10 @@ def _truth(truths, keys, cameras, file, categories, boxes):
     return tuple(result)
 
 
-def _pose(entry, rotation_key, translation_key, where):
+def _pose(entry: dict[str, Any], rotation_key: str, translation_key: str,
+          where: str) -> Float64Array:
     """Return a (4, 4) transform in metres from BOP's row-major rotation and millimetres."""
-    R = files.numbers(files.required(entry, rotation_key, where), 9,
+    R = fields.numbers(fields.required(entry, rotation_key, where), 9,
                       f'{where} {rotation_key}').reshape(3, 3)
     if abs(R @ R.T - np.eye(3)).max() > 1e-3 or np.linalg.det(R) < 0:
         raise HoocError(f'{where} {rotation_key} is not a rotation; '
@@ -190,7 +206,7 @@ def _pose(entry, rotation_key, translation_key, where):
     T = np.eye(4)
     u, _, vt = np.linalg.svd(R)
     T[:3, :3] = u @ vt
-    T[:3, 3] = MM * files.numbers(files.required(entry, translation_key, where), 3,
+    T[:3, 3] = MM * fields.numbers(fields.required(entry, translation_key, where), 3,
                                   f'{where} {translation_key}')
     return T
 
@@ -198,11 +214,12 @@ def _pose(entry, rotation_key, translation_key, where):
 class _Boxes:
     """Bounding boxes of the models: from models_info.json, or from the meshes without it."""
 
-    def __init__(self, categories, info_file, info):
+    def __init__(self, categories: Mapping[int, Category], info_file: Path,
+                 info: dict[str, Any]) -> None:
         self._categories, self._file, self._info = categories, info_file, info
-        self._known = {}
+        self._known: dict[int, tuple[Float64Array, Float64Array]] = {}
 
-    def of(self, obj_id):
+    def of(self, obj_id: int) -> tuple[Float64Array, Float64Array]:
         """Return (centre (3,), size (3,)) in metres."""
         if obj_id not in self._known:
             self._known[obj_id] = (_box(self._info, obj_id, self._file) if self._info else
@@ -210,13 +227,14 @@ class _Boxes:
         return self._known[obj_id]
 
 
-def _box(info, obj_id, info_file):
+def _box(info: dict[str, Any], obj_id: int,
+         info_file: Path) -> tuple[Float64Array, Float64Array]:
     """Return (centre (3,), size (3,)) in metres of a model's bounding box."""
     where = f'{info_file}: {obj_id}'
-    entry = files.mapping(files.required(info, str(obj_id), f'{info_file}:'), where)
-    low = np.array([files.number(files.required(entry, f'min_{a}', where), f'{where} min_{a}')
+    entry = fields.mapping(fields.required(info, str(obj_id), f'{info_file}:'), where)
+    low = np.array([fields.number(fields.required(entry, f'min_{a}', where), f'{where} min_{a}')
                     for a in 'xyz'])
-    size = np.array([files.number(files.required(entry, f'size_{a}', where), f'{where} size_{a}')
+    size = np.array([fields.number(fields.required(entry, f'size_{a}', where), f'{where} size_{a}')
                      for a in 'xyz'])
     if size.min() <= 0:
         raise HoocError(f'{where} size is {size.tolist()}; give three positive millimetres')

@@ -2,14 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Read and write results files, format `hooc-results/1` (docs/scene_sets.md)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 import json
 import math
+from pathlib import Path
 from typing import Any
 
 from hooc_perception.core.types import ParsedScene
 from hooc_perception.errors import HoocError
-from hooc_perception.io.scenes import files
+from hooc_perception.io.scenes import fields, files
 import numpy as np
 
 FORMAT = 'hooc-results/1'
@@ -28,7 +29,7 @@ def scene_entry(name: str, entry: Mapping[str, Any], seconds: float, **extra: An
     Return the dict of one scene in a results file.
 
     :param entry: as `parsed_entry` or `Scene.to_dict` return it.
-    :param seconds: from the last depth image's arrival to the result.
+    :param seconds: from the arrival of the last depth image to the result.
     :param extra: more entries of this scene, such as `world` of a RecordedScene or a seed.
     """
     return {'scene': name, 'seconds': float(seconds), **entry, **extra}
@@ -40,7 +41,9 @@ def parsed_entry(parsed: ParsedScene, category_names: Sequence[str]) -> dict[str
 
     :param category_names: names of the class ids 1..N.
     """
-    energy = {term: _finite(getattr(parsed.energy, term)) for term in _TERMS}
+    terms = parsed.energy
+    energy = {'total': _finite(terms.total), 'depth': _finite(terms.depth),
+              'probability': _finite(terms.probability), 'overlap': _finite(terms.overlap)}
     found = parsed.objects
     sigmas = {name: sigma for name, sigma in (('sigma_t', parsed.sigma_t),
                                               ('sigma_r', parsed.sigma_r)) if sigma is not None}
@@ -61,22 +64,23 @@ def parsed_entry(parsed: ParsedScene, category_names: Sequence[str]) -> dict[str
             'stage_seconds': {stage: float(s) for stage, s in parsed.seconds.items()}}
 
 
-def write_results(path, dataset, scenes, **extra):
+def write_results(path: str | Path, dataset: str, scenes: Iterable[dict[str, Any]],
+                  **extra: Any) -> None:
     """
-    Write a results file in one move: a reader never sees half of it.
+    Write a results file atomically.
 
-    :param scenes: dicts as `scene_result` makes them.
+    :param scenes: dicts from `scene_result`.
     :param extra: more entries at the top, such as profile and seed.
-    :raises HoocError: where an entry breaks the format; nothing is written then.
+    :raises HoocError: if an entry breaks the format; nothing is written then.
     """
     content = {'format': FORMAT, 'dataset': dataset, **extra, 'scenes': list(scenes)}
     _check(content, str(path))
     files.write_atomically(path, json.dumps(content, indent=1, allow_nan=False) + '\n')
 
 
-def load_results(path):
+def load_results(path: str | Path) -> dict[str, Any]:
     """
-    Return the checked content of a results file; entries that we do not know are kept.
+    Return the checked content of a results file; unknown entries are kept.
 
     :raises HoocError: one sentence that names file, scene and field.
     """
@@ -85,19 +89,20 @@ def load_results(path):
     return content
 
 
-def scenes_in_common(results, names, results_path, place):
+def scenes_in_common(results: dict[str, Any], names: Collection[str], results_path: str | Path,
+                     place: str | Path) -> tuple[dict[str, dict[str, Any]], str]:
     """
-    Return ({scene: entry} of the scenes that a set holds, what the others are in words or '').
+    Return ({scene: entry} of the scenes that a set holds, the other scenes in words or '').
 
     :param results: content of a results file; `names`: the set's scenes.
     :param place: names the set in the error.
-    :raises HoocError: where there is no scene in common.
+    :raises HoocError: if there is no scene in common.
     """
     entries = {entry['scene']: entry for entry in results['scenes']}
     common = {name: entry for name, entry in entries.items() if name in names}
     if not common:
         raise HoocError(f'{results_path} and {place} have no scene in common; '
-                        'give the set that the results are of')
+                        'give the set that the results belong to')
     others = [name for name in entries if name not in names]
     if not others:
         return common, ''
@@ -106,51 +111,55 @@ def scenes_in_common(results, names, results_path, place):
                     f'{"is" if len(others) == 1 else "are"}')
 
 
-def _check(content, path):
-    """Raise HoocError where a results file breaks the format."""
-    if files.required(content, 'format', f'{path}:') != FORMAT:
-        raise HoocError(f'{path}: format is {files.shown(content["format"])}; this version reads '
-                        f'{FORMAT!r}, so write the results again')
-    files.text(files.required(content, 'dataset', f'{path}:'), f'{path}: dataset')
-    scenes = files.sequence(files.required(content, 'scenes', f'{path}:'), f'{path}: scenes')
+def _check(content: dict[str, Any], path: str) -> None:
+    """Raise HoocError if a results file breaks the format."""
+    if fields.required(content, 'format', f'{path}:') != FORMAT:
+        raise HoocError(f'{path}: format is {fields.short_repr(content["format"])}; this version '
+                        f'reads {FORMAT!r}, so write the results again')
+    fields.text(fields.required(content, 'dataset', f'{path}:'), f'{path}: dataset')
+    scenes = fields.sequence(fields.required(content, 'scenes', f'{path}:'), f'{path}: scenes')
     names = []
     for i, scene in enumerate(scenes):
-        scene = files.mapping(scene, f'{path}: scenes[{i}]')
-        names.append(files.text(files.required(scene, 'scene', f'{path}: scenes[{i}]:'),
-                                f'{path}: scenes[{i}] scene'))
+        scene = fields.mapping(scene, f'{path}: scenes[{i}]')
+        names.append(fields.text(fields.required(scene, 'scene', f'{path}: scenes[{i}]:'),
+                                 f'{path}: scenes[{i}] scene'))
         _check_scene(scene, f'{path}: scene {names[-1]}:')
-    files.unique(names, f'{path}: scenes')
+    fields.unique(names, f'{path}: scenes')
 
 
-def _check_scene(scene, where):
+def _check_scene(scene: dict[str, Any], where: str) -> None:
     """Check one scene's entry; `where` names file and scene."""
-    if files.number(files.required(scene, 'seconds', where), f'{where} seconds') < 0:
+    if fields.number(fields.required(scene, 'seconds', where), f'{where} seconds') < 0:
         raise HoocError(f'{where} seconds is negative; give the time that the scene took')
     if scene.get('energy') is not None:
-        energy = files.mapping(scene['energy'], f'{where} energy')
+        energy = fields.mapping(scene['energy'], f'{where} energy')
         for term in _TERMS:
-            value = files.required(energy, term, f'{where} energy')
+            value = fields.required(energy, term, f'{where} energy')
             if value is not None:
-                files.number(value, f'{where} energy {term}')
-    objects = files.sequence(files.required(scene, 'objects', where), f'{where} objects')
+                fields.number(value, f'{where} energy {term}')
+    objects = fields.sequence(fields.required(scene, 'objects', where), f'{where} objects')
     for i, item in enumerate(objects):
-        at = f'{where} objects[{i}]'
-        item = files.mapping(item, at)
-        files.text(files.required(item, 'category', at), f'{at} category')
-        if item.get('score') is not None:
-            files.number(item['score'], f'{at} score')
-        files.numbers(files.required(item, 'translation', at), 3, f'{at} translation')
-        quaternion = files.numbers(files.required(item, 'rotation_xyzw', at), 4,
-                                   f'{at} rotation_xyzw')
-        if abs(np.linalg.norm(quaternion) - 1) > 1e-3:
-            raise HoocError(f'{at} rotation_xyzw has length {np.linalg.norm(quaternion):.6g}; '
-                            'give a unit quaternion [x, y, z, w]')
-        size = files.numbers(files.required(item, 'size', at), 3, f'{at} size')
-        if size.min() < 0:
-            raise HoocError(f'{at} size is {size.tolist()}; give three lengths in metres')
+        _check_object(item, f'{where} objects[{i}]')
 
 
-def _finite(value):
-    """Return a float, None where it is not finite: JSON has no NaN."""
+def _check_object(item: object, where: str) -> None:
+    """Check one object's entry; `where` names file, scene and row."""
+    item = fields.mapping(item, where)
+    fields.text(fields.required(item, 'category', where), f'{where} category')
+    if item.get('score') is not None:
+        fields.number(item['score'], f'{where} score')
+    fields.numbers(fields.required(item, 'translation', where), 3, f'{where} translation')
+    quaternion = fields.numbers(fields.required(item, 'rotation_xyzw', where), 4,
+                                f'{where} rotation_xyzw')
+    if abs(np.linalg.norm(quaternion) - 1) > 1e-3:
+        raise HoocError(f'{where} rotation_xyzw has length {np.linalg.norm(quaternion):.6g}; '
+                        'give a unit quaternion [x, y, z, w]')
+    size = fields.numbers(fields.required(item, 'size', where), 3, f'{where} size')
+    if size.min() < 0:
+        raise HoocError(f'{where} size is {size.tolist()}; give three lengths in metres')
+
+
+def _finite(value: Any) -> float | None:
+    """Return a float, None if it is not finite: JSON has no NaN."""
     value = float(value)
     return value if math.isfinite(value) else None

@@ -1,14 +1,16 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Read and write scene sets, format `hooc-scenes/1` (docs/scene_sets.md); BOP is read too."""
+"""Load scene sets, format `hooc-scenes/1` (docs/scene_sets.md), and BOP datasets."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from hooc_perception.chain import check_categories
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
-from hooc_perception.io.scenes import camera_files, files
+from hooc_perception.io.scenes import camera_files, fields, files
 from hooc_perception.io.scenes.bop import is_bop, load_bop
 from hooc_perception.io.scenes.nominal_table import nominal_cameras
 from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
@@ -27,52 +29,52 @@ __all__ = ['Category', 'NewScene', 'RecordedScene', 'SceneSet', 'TrueObject', 'l
 @dataclass(frozen=True, eq=False)
 class SceneSet:
     """
-    A folder of scenes, the categories that may stand in them, and the cameras that saw them.
+    A folder of scenes, the categories that may occur in them, and the cameras.
 
     :ivar world_frame: name of the frame of all poses; z up, z = 0 is the table top.
-    :ivar categories: tuple of Category; class id c is categories[c - 1].
-    :ivar cameras: tuple of Camera: the set's, or those of its first scene.
-    :ivar max_instances: objects of one category that a scene may hold, 0 = no limit.
-    :ivar scenes: tuple of RecordedScene, sorted by name; their depth is read when asked for.
+    :ivar categories: class id c is categories[c - 1].
+    :ivar cameras: the set's, or those of its first scene.
+    :ivar max_instances: most objects of one category in a scene, 0 = no limit.
+    :ivar scenes: sorted by name; their depth is read on demand.
     """
 
     path: Path
     name: str
     world_frame: str
-    categories: tuple
+    categories: tuple[Category, ...]
     cameras: tuple[Camera, ...]
     max_instances: int
-    scenes: tuple
+    scenes: tuple[RecordedScene, ...]
 
     @property
-    def category_names(self):
+    def category_names(self) -> tuple[str, ...]:
         """Return the names in the order of the class ids 1..N."""
         return tuple(category.name for category in self.categories)
 
-    def scene(self, name):
-        """Return one scene by name; raise HoocError where there is none."""
+    def scene(self, name: str) -> RecordedScene:
+        """Return one scene by name; raise HoocError if there is none."""
         for scene in self.scenes:
             if scene.name == name:
                 return scene
         known = ', '.join(scene.name for scene in self.scenes[:20])
         raise HoocError(f'{self.path}: there is no scene {name!r}; choose one of {known}')
 
-    def selected(self, names):
+    def selected(self, names: Iterable[str] | None) -> 'SceneSet':
         """Return a set with these scenes only, each once, in this order (no `names`: all)."""
         if not names:
             return self
         return replace(self, scenes=tuple(self.scene(name) for name in dict.fromkeys(names)))
 
 
-def load_scene_set(path, with_scenes=True):
+def load_scene_set(path: str | Path, with_scenes: bool = True) -> SceneSet:
     """
-    Return the SceneSet of a `hooc-scenes/1` folder or of a BOP dataset, whichever it is.
+    Return the SceneSet of a `hooc-scenes/1` folder or of a BOP dataset.
 
-    :param with_scenes: False reads models and cameras only, as training must; the set's
-        `scenes` are empty then, and where the table is not known it is a nominal one
-        (nominal_table.py), for nothing but camera files is opened.
-    :raises HoocError: one sentence that names file, field and mend. Depth images are looked
-        at no sooner than their scene's `depth()` is called.
+    :param with_scenes: False reads models and cameras only, as training must. The set's
+        `scenes` are empty then, and if the table frame is unknown it is a nominal one
+        (nominal_table.py), since only camera files are opened.
+    :raises HoocError: one sentence that names file, field and fix. Depth images are not read
+        before their scene's `depth()` is called.
     """
     path = Path(path)
     if not path.is_dir():
@@ -83,29 +85,24 @@ def load_scene_set(path, with_scenes=True):
     return _load_hooc(path, with_scenes)
 
 
-def _load_hooc(path, with_scenes):
+def _load_hooc(path: Path, with_scenes: bool) -> SceneSet:
     """Return the SceneSet of a `hooc-scenes/1` folder."""
     file = path / 'dataset.yaml'
     entry = files.read_yaml(file)
-    if files.required(entry, 'format', f'{file}:') != FORMAT:
-        raise HoocError(f'{file}: format is {files.shown(entry["format"])}; this version reads '
-                        f'{FORMAT!r}, so convert the set or correct the field')
+    if fields.required(entry, 'format', f'{file}:') != FORMAT:
+        raise HoocError(f'{file}: format is {fields.short_repr(entry["format"])}; this version '
+                        f'reads {FORMAT!r}, so convert the set or correct the field')
     categories = _categories(path, file, entry)
-    camera_names = files.unique(
-        [files.ros_token(name, f'{file}: cameras') for name in
-         files.sequence(files.required(entry, 'cameras', f'{file}:'), f'{file}: cameras')],
-        f'{file}: cameras')
-    if not camera_names:
-        raise HoocError(f'{file}: cameras is empty; name at least one camera')
-    unit = files.number(entry.get('depth_unit', 0.001), f'{file}: depth_unit')
+    camera_names = _camera_names(file, entry)
+    unit = fields.number(entry.get('depth_unit', 0.001), f'{file}: depth_unit')
     if not 1e-6 <= unit <= 0.1:
         raise HoocError(f'{file}: depth_unit is {unit:g}; give the metres of one count, '
                         '0.001 for millimetres')
-    limit = files.whole(entry.get('max_instances_per_category', 0), 0, 1000,
-                        f'{file}: max_instances_per_category')
+    limit = fields.integer(entry.get('max_instances_per_category', 0), 0, 1000,
+                           f'{file}: max_instances_per_category')
     known = path / 'cameras.yaml'
     set_cameras = camera_files.load_cameras(known) if known.is_file() else {}
-    world = files.name(entry.get('world_frame', 'table'), f'{file}: world_frame')
+    world = fields.name(entry.get('world_frame', 'table'), f'{file}: world_frame')
     own = bool(set_cameras) and world != UNKNOWN_WORLD
     folders = _scene_folders(path, needed=with_scenes or not set_cameras)
     scenes = tuple(_scene(folder, camera_names, set_cameras, unit, categories, world, path)
@@ -119,46 +116,57 @@ def _load_hooc(path, with_scenes):
     else:
         cameras = _scene_cameras(folders[0], camera_names, {}, path)
         cameras = nominal_cameras(cameras) if world == UNKNOWN_WORLD else cameras
-    return SceneSet(path, files.name(entry.get('name', path.resolve().name), f'{file}: name'),
+    return SceneSet(path, fields.name(entry.get('name', path.resolve().name), f'{file}: name'),
                     'table' if world == UNKNOWN_WORLD else world, categories, cameras, limit,
                     scenes)
 
 
-def _categories(path, file, entry):
+def _camera_names(file: Path, entry: dict[str, Any]) -> tuple[str, ...]:
+    """Return the camera names in dataset.yaml, in their order."""
+    where = f'{file}: cameras'
+    names = fields.sequence(fields.required(entry, 'cameras', f'{file}:'), where)
+    names = fields.unique([fields.ros_token(name, where) for name in names], where)
+    if not names:
+        raise HoocError(f'{where} is empty; name at least one camera')
+    return names
+
+
+def _categories(path: Path, file: Path, entry: dict[str, Any]) -> tuple[Category, ...]:
     """Return the categories of dataset.yaml, in the order of their class ids."""
-    entries = files.sequence(files.required(entry, 'categories', f'{file}:'),
-                             f'{file}: categories')
+    entries = fields.sequence(fields.required(entry, 'categories', f'{file}:'),
+                              f'{file}: categories')
     if not 1 <= len(entries) <= MAX_CATEGORIES:
         raise HoocError(f'{file}: categories has {len(entries)} entries; '
                         f'give 1 to {MAX_CATEGORIES}')
     result = []
     for i, item in enumerate(entries):
         where = f'{file}: categories[{i}]'
-        item = files.mapping(item, where)
-        name = files.name(files.required(item, 'name', f'{where}:'), f'{where} name')
+        item = fields.mapping(item, where)
+        name = fields.name(fields.required(item, 'name', f'{where}:'), f'{where} name')
         where = f'{file}: category {name}:'
-        mesh = files.inside(path, files.required(item, 'model', where), f'{where} model')
-        scale = files.number(item.get('scale', 1.0), f'{where} scale')
+        mesh = files.file_inside(path, fields.required(item, 'model', where), f'{where} model')
+        scale = fields.number(item.get('scale', 1.0), f'{where} scale')
         if scale <= 0:
             raise HoocError(f'{where} scale is {scale:g}; give the metres of one model unit')
         result.append(Category(name, mesh, scale))
-    check_categories(files.unique([category.name for category in result], f'{file}: categories'),
+    check_categories(fields.unique([category.name for category in result], f'{file}: categories'),
                      file)
     return tuple(result)
 
 
-def _scene_folders(path, needed):
+def _scene_folders(path: Path, needed: bool) -> list[Path]:
     """Return the sorted folders below scenes/."""
     root = path / 'scenes'
     folders = sorted(p for p in root.iterdir() if p.is_dir() and not p.name.startswith('.')) \
         if root.is_dir() else []
     if not folders and needed:
-        raise HoocError(f'{root}: there is no scene; add one folder a scene, '
+        raise HoocError(f'{root}: there is no scene; add one folder per scene, '
                         'with one <camera>.png each')
     return folders
 
 
-def _chosen(names, cameras, cameras_file, dataset_file):
+def _chosen(names: Sequence[str], cameras: Mapping[str, Camera], cameras_file: Path,
+            dataset_file: Path) -> tuple[Camera, ...]:
     """Return the named cameras as a tuple."""
     for name in names:
         if name not in cameras:
@@ -167,8 +175,9 @@ def _chosen(names, cameras, cameras_file, dataset_file):
     return tuple(cameras[name] for name in names)
 
 
-def _scene_cameras(folder, names, set_cameras, path):
-    """Return a scene's cameras: its own where it has any, the set's otherwise."""
+def _scene_cameras(folder: Path, names: Sequence[str], set_cameras: Mapping[str, Camera],
+                   path: Path) -> tuple[Camera, ...]:
+    """Return a scene's cameras: its own if it has any, otherwise the set's."""
     own = folder / 'cameras.yaml'
     if not own.is_file():
         if not set_cameras:
@@ -179,9 +188,10 @@ def _scene_cameras(folder, names, set_cameras, path):
                    path / 'dataset.yaml')
 
 
-def _scene(folder, camera_names, set_cameras, unit, categories, world, path):
+def _scene(folder: Path, camera_names: Sequence[str], set_cameras: Mapping[str, Camera],
+           unit: float, categories: Sequence[Category], world: str, path: Path) -> RecordedScene:
     """Return the RecordedScene of one folder below scenes/."""
-    name = files.name(folder.name, f"{folder}: the name of a scene's folder")
+    name = fields.name(folder.name, f"{folder}: the name of a scene's folder")
     depth_files = tuple(folder / f'{camera}.png' for camera in camera_names)
     for camera, file in zip(camera_names, depth_files):
         if not file.is_file():
@@ -196,10 +206,10 @@ def _scene(folder, camera_names, set_cameras, unit, categories, world, path):
                          table_known=world != UNKNOWN_WORLD)
 
 
-def _truth(file, categories):
-    """Return the tuple of TrueObject of a ground_truth.yaml."""
+def _truth(file: Path, categories: Sequence[Category]) -> tuple[TrueObject, ...]:
+    """Return the objects of a ground_truth.yaml."""
     known = {category.name for category in categories}
-    objects = files.read_yaml(file)
-    objects = files.sequence(files.required(objects, 'objects', f'{file}:'), f'{file}: objects')
+    objects = fields.sequence(fields.required(files.read_yaml(file), 'objects', f'{file}:'),
+                              f'{file}: objects')
     return tuple(true_object(item, f'{file}: objects[{i}]', known)
                  for i, item in enumerate(objects))

@@ -1,27 +1,31 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Find the table in depth images whose world frame is not known to be a table's."""
+"""Estimate the frame of the table from depth images whose world frame is unknown."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
+from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.geometry import pose_from_matrix, stage_rng, transform
+from hooc_perception.core.types import DepthView
 from hooc_perception.errors import HoocError
 import numpy as np
 
-# Depth is thinned to about this many points a scene; a plane needs no more.
+# Depth is thinned to about this many points per scene; a plane needs no more.
 MAX_POINTS = 40_000
 TRIALS = 400
-# Planes that are looked at, largest first: a table may be smaller than the wall behind it.
+# Number of planes to try, largest first: a table may be smaller than the wall behind it.
 MAX_PLANES = 3
 MIN_SHARE = 0.08
-# Distance from a plane within which a point belongs to it: calibration, and noise that grows
+# A point within this distance belongs to a plane: a calibration error plus noise that grows
 # with the square of the distance (Khoshelham & Elberink 2012, structured light).
 TOLERANCE_M, TOLERANCE_PER_M = 0.006, 0.004
-# What stands on a table: between these heights.
+# Height range of points on objects that stand on the table.
 LOWEST_M, HIGHEST_M = 0.015, 0.5
 MIN_STANDING_SHARE = 0.003
-# Cosine between a plane's normal and the images' upward direction; 0 seen from straight above.
+# Least cosine between a plane's normal and the images' upward direction; 0 seen from above.
 MIN_UPRIGHT = 0.1
 CELL_M = 0.02
 
@@ -29,21 +33,21 @@ CELL_M = 0.02
 @dataclass(frozen=True, eq=False)
 class SupportPlane:
     """
-    A table frame estimated from depth: z up, origin under the centre of what stands on it.
+    A table frame estimated from depth: z up, origin below the centre of the objects on it.
 
     Its x axis points to the right in the first camera's image.
 
-    :ivar T_table_source: (4, 4) float64, from the frame of the files to the table's.
+    :ivar T_table_source: (4, 4) float64, from the frame of the files to the table frame.
     :ivar inlier_share: share of the measured points that lie on the plane.
     :ivar residual_m: RMS distance of those points from the plane.
     """
 
-    T_table_source: np.ndarray
+    T_table_source: Float64Array
     inlier_share: float
     residual_m: float
 
-    def as_dict(self):
-        """Return plain data, as it is written down with the results."""
+    def as_dict(self) -> dict[str, Any]:
+        """Return plain data for a results file."""
         translation, rotation = pose_from_matrix(self.T_table_source)
         return {'frame': 'table', 'estimated_from': 'dominant support plane',
                 'table_from_source': {'translation': translation.tolist(),
@@ -52,16 +56,16 @@ class SupportPlane:
                 'residual_m': round(self.residual_m, 5)}
 
 
-def estimate_table_frame(views, scene_name):
+def estimate_table_frame(views: Sequence[DepthView], scene_name: str) -> SupportPlane:
     """
     Return the SupportPlane of one scene: RANSAC, then a least-squares fit to the inliers.
 
-    The table is the largest plane on which something stands and whose normal points upwards in
-    the images, as a table's does for a camera that hangs upright; a wall's does not. Where no
-    plane has both, one will do. The same views give the same frame.
+    The table is the largest plane that supports objects and whose normal points upwards in the
+    images, as a table's does for an upright camera and a wall's does not. If no plane meets
+    both conditions, one is enough. The same views give the same frame.
 
-    :param views: DepthViews, raw; their cameras' poses say where the source frame is.
-    :raises HoocError: where no plane holds a fair share of the points.
+    :param views: raw; the poses of their cameras define the source frame.
+    :raises HoocError: if no plane contains at least MIN_SHARE of the points.
     """
     points, tolerance = _points(views)
     T_source_camera = views[0].camera.T_world_camera
@@ -84,8 +88,8 @@ def estimate_table_frame(views, scene_name):
         if best is None or plane > best[0]:
             best = plane, normal, offset, inliers, standing
     if best is None:
-        raise HoocError(f'scene {scene_name}: no support plane is found in the depth images, so '
-                        'the table frame stays unknown; give extrinsics in a table frame')
+        raise HoocError(f'scene {scene_name}: no support plane was found in the depth images, so '
+                        'the table frame is unknown; give extrinsics in a table frame')
     _, normal, offset, inliers, standing = best
     T_table_source = _frame(normal, offset, points[standing if standing.any() else inliers],
                             T_source_camera)
@@ -94,8 +98,8 @@ def estimate_table_frame(views, scene_name):
                         float(np.sqrt(np.mean(height ** 2))))
 
 
-def _points(views):
-    """Return measured points (n, 3) in the source frame and each one's plane tolerance (n,)."""
+def _points(views: Sequence[DepthView]) -> tuple[Float64Array, Float64Array]:
+    """Return measured points (n, 3) in the source frame and their plane tolerances (n,)."""
     readings = sum(int(np.isfinite(view.depth).sum()) for view in views)
     step = max(1, int(np.sqrt(readings / MAX_POINTS)))
     points, tolerance = [], []
@@ -106,7 +110,7 @@ def _points(views):
             continue
         z = depth[::step, ::step][rows, cols].astype(np.float64)
         pixels = np.stack([cols, rows], -1).astype(np.float64) * step
-        # OpenCV knows no skew.
+        # OpenCV's model has no skew.
         pixels[:, 0] -= camera.K[0, 1] * (pixels[:, 1] - camera.K[1, 2]) / camera.K[1, 1]
         rays = cv2.undistortPoints(pixels[:, None], camera.K, camera.D)[:, 0]
         points.append(transform(camera.T_world_camera,
@@ -117,10 +121,11 @@ def _points(views):
     return np.concatenate(points), np.concatenate(tolerance)
 
 
-def _largest_plane(points, tolerance, candidates, rng):
+def _largest_plane(points: Float64Array, tolerance: Float64Array, candidates: BoolArray,
+                   rng: np.random.Generator) -> tuple[Float64Array, float, BoolArray]:
     """Return (unit normal (3,), offset, inliers (n,) bool) of n . p + offset = 0."""
     index = np.flatnonzero(candidates)
-    # Counting on a sample is enough to rank; the fit then uses every point.
+    # A sample is enough to rank the planes; the fit then uses every point.
     sample = rng.choice(index, min(len(index), 4000), replace=False)
     corners = points[rng.choice(index, (TRIALS, 3))]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -142,10 +147,11 @@ def _largest_plane(points, tolerance, candidates, rng):
         centred = points[inliers] - mean
         normal = np.linalg.eigh((centred * weight[:, None]).T @ centred)[1][:, 0]
         offset = -normal @ mean
-    return normal, offset, candidates & (np.abs(points @ normal + offset) < tolerance)
+    return normal, float(offset), candidates & (np.abs(points @ normal + offset) < tolerance)
 
 
-def _standing(points, normal, offset, inliers):
+def _standing(points: Float64Array, normal: Float64Array, offset: float,
+              inliers: BoolArray) -> BoolArray:
     """Return (n,) bool: points above the plane's largest connected piece."""
     across = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     across /= np.linalg.norm(across)
@@ -160,7 +166,7 @@ def _standing(points, normal, offset, inliers):
     grid = np.zeros(((high - low) / CELL_M).astype(int) + 2, np.uint8)
     on_plane = near & inliers
     grid[cells[on_plane, 0], cells[on_plane, 1]] = 255
-    # What stands on a table hides parts of it: close the holes before asking what hangs together.
+    # Objects hide parts of the table: close these holes before finding connected pieces.
     grid = cv2.morphologyEx(grid, cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8))
     count, pieces, stats, _ = cv2.connectedComponentsWithStats(grid)
     if count < 2:
@@ -173,8 +179,9 @@ def _standing(points, normal, offset, inliers):
     return standing
 
 
-def _frame(normal, offset, points, T_source_camera):
-    """Return T_table_source with the origin under the middle of the points' footprint."""
+def _frame(normal: Float64Array, offset: float, points: Float64Array,
+           T_source_camera: Float64Array) -> Float64Array:
+    """Return T_table_source with the origin below the middle of the points' footprint."""
     z = normal
     right = T_source_camera[:3, 0]
     x = right - z * (right @ z)
@@ -185,6 +192,6 @@ def _frame(normal, offset, points, T_source_camera):
     T_table_source[:3, :3] = np.stack([x, np.cross(z, x), z])
     T_table_source[2, 3] = offset
     flat = transform(T_table_source, points)[:, :2]
-    # Cells count once, so that neither tall things nor those near a camera draw the middle.
+    # Each cell counts once, so that neither tall nor near objects bias the middle.
     T_table_source[:2, 3] = -CELL_M * (np.unique(np.floor(flat / CELL_M), axis=0) + 0.5).mean(0)
     return T_table_source

@@ -2,14 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write scene sets, format `hooc-scenes/1` (docs/scene_sets.md)."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from hooc_perception.chain import check_categories
+from hooc_perception.core.arrays import Float32Array, UInt8Array
+from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.io.depth_encodings import counts_from_depth
-from hooc_perception.io.scenes import camera_files, files, png
+from hooc_perception.io.scenes import camera_files, fields, files, png
+from hooc_perception.io.scenes.scene import TrueObject
 import numpy as np
+import trimesh
 import yaml
 
 FORMAT = 'hooc-scenes/1'
@@ -18,50 +24,52 @@ FORMAT = 'hooc-scenes/1'
 @dataclass(frozen=True, eq=False)
 class NewScene:
     """
-    A scene that is to be written.
+    A scene to be written.
 
-    :ivar depth: one (H, W) array a camera, in camera order; metres, NaN = none, distorted.
-    :ivar truth: sequence of TrueObject, None where nobody annotated.
+    :ivar depth: one (H, W) array per camera, in camera order; metres, NaN = none, distorted.
+    :ivar truth: None without annotation.
     :ivar labels: {camera name: (H, W) uint8 instance labels}, None for none.
-    :ivar cameras: sequence of Camera where this scene's differ from the set's, else None.
+    :ivar cameras: only if this scene's cameras differ from the set's.
     """
 
     name: str
-    depth: tuple
-    truth: tuple | None = None
-    labels: dict | None = None
-    cameras: tuple | None = None
+    depth: tuple[Float32Array, ...]
+    truth: tuple[TrueObject, ...] | None = None
+    labels: dict[str, UInt8Array] | None = None
+    cameras: tuple[Camera, ...] | None = None
 
 
-def write_scene_set(path, name, meshes, cameras, scenes, max_instances=0, depth_unit=0.001,
-                    world_frame='table'):
+def write_scene_set(path: str | Path, name: str, meshes: Mapping[str, trimesh.Trimesh],
+                    cameras: Sequence[Camera], scenes: Iterable[NewScene],
+                    max_instances: int = 0, depth_unit: float = 0.001,
+                    world_frame: str = 'table') -> Path:
     """
     Write a scene set that `load_scene_set` reads back.
 
     :param path: a folder that does not exist yet or is empty.
-    :param meshes: {category: trimesh.Trimesh in metres}, in the order of the class ids.
-    :param cameras: sequence of Camera, the same for all scenes that bring none of their own.
-    :param scenes: iterable of NewScene; consumed one by one, so that it may be a generator.
-    :param max_instances: objects of one category that a scene may hold, 0 = no limit.
+    :param meshes: {category: mesh in metres}, in the order of the class ids.
+    :param cameras: shared by all scenes that have no cameras of their own.
+    :param scenes: consumed one by one, so a generator is fine.
+    :param max_instances: most objects of one category in a scene, 0 = no limit.
     :param depth_unit: metres per PNG count.
     :return: the folder.
-    :raises HoocError: where the folder is in use or a scene does not fit to its cameras.
+    :raises HoocError: if the folder is in use or a scene does not fit its cameras.
     """
     path = Path(path)
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise HoocError(f'{path}: the folder is in use; choose a new one or empty it')
     for category in meshes:
-        files.name(category, f'{path}: the name of a category')
+        fields.name(category, f'{path}: the name of a category')
     check_categories(meshes, path)
     (path / 'models').mkdir(parents=True, exist_ok=True)
     for category, mesh in meshes.items():
         mesh.export(path / 'models' / f'{category}.ply')
     camera_files.write_cameras(path / 'cameras.yaml', cameras)
     for scene in scenes:
-        write_scene(path / 'scenes' / files.name(scene.name, f'{path}: the name of a scene'),
+        write_scene(path / 'scenes' / fields.name(scene.name, f'{path}: the name of a scene'),
                     scene, cameras, depth_unit)
-    # Last, so that a set whose writing was interrupted does not pass for a whole one.
-    content = {'format': FORMAT, 'name': files.name(name, f'{path}: the name of the set'),
+    # Last, so that a set whose writing was interrupted does not look complete.
+    content = {'format': FORMAT, 'name': fields.name(name, f'{path}: the name of the set'),
                'world_frame': world_frame, 'depth_unit': float(depth_unit),
                'cameras': [camera.name for camera in cameras]}
     if max_instances:
@@ -72,7 +80,8 @@ def write_scene_set(path, name, meshes, cameras, scenes, max_instances=0, depth_
     return path
 
 
-def write_scene(folder, scene, set_cameras, depth_unit=0.001):
+def write_scene(folder: Path, scene: NewScene, set_cameras: Sequence[Camera],
+                depth_unit: float = 0.001) -> None:
     """Write the files of one scene into `folder`."""
     cameras = scene.cameras or set_cameras
     if len(scene.depth) != len(cameras):
@@ -84,8 +93,8 @@ def write_scene(folder, scene, set_cameras, depth_unit=0.001):
             raise HoocError(f'{folder}: the depth of {camera.name} has shape {np.shape(depth)}, '
                             f'its camera ({camera.height}, {camera.width}); make them agree')
         png.write_png(folder / f'{camera.name}.png', counts_from_depth(depth, depth_unit))
-    for camera, labels in (scene.labels or {}).items():
-        png.write_png(folder / f'{camera}_labels.png', np.asarray(labels, np.uint8))
+    for camera_name, labels in (scene.labels or {}).items():
+        png.write_png(folder / f'{camera_name}_labels.png', np.asarray(labels, np.uint8))
     if scene.cameras:
         camera_files.write_cameras(folder / 'cameras.yaml', scene.cameras)
     if scene.truth is not None:
@@ -93,17 +102,18 @@ def write_scene(folder, scene, set_cameras, depth_unit=0.001):
                                _yaml({'objects': [true_object_entry(t) for t in scene.truth]}))
 
 
-def true_object_entry(true):
-    """Return the plain mapping of a TrueObject, as ground_truth.yaml and bags hold it."""
-    entry = {'category': true.category,
-             'translation': np.asarray(true.translation, np.float64).tolist(),
-             'rotation_xyzw': np.asarray(true.rotation_xyzw, np.float64).tolist(),
-             'size': np.asarray(true.size, np.float64).tolist()}
+def true_object_entry(true: TrueObject) -> dict[str, Any]:
+    """Return a TrueObject as the plain mapping in ground_truth.yaml and bags."""
+    entry: dict[str, Any] = {
+        'category': true.category,
+        'translation': np.asarray(true.translation, np.float64).tolist(),
+        'rotation_xyzw': np.asarray(true.rotation_xyzw, np.float64).tolist(),
+        'size': np.asarray(true.size, np.float64).tolist()}
     if true.surface_visibility is not None:
         entry['surface_visibility'] = float(true.surface_visibility)
     return entry
 
 
-def _yaml(content):
-    """Return YAML text with the keys in their order and number lists in one line."""
+def _yaml(content: dict[str, Any]) -> str:
+    """Return YAML text with the keys in their order and each number list on one line."""
     return yaml.safe_dump(content, sort_keys=False, default_flow_style=None, width=99)

@@ -14,7 +14,7 @@ from hooc_perception.core.segment.checks import (
 from hooc_perception.core.segment.fusion import Fusion
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
-from hooc_perception.io.depth_encodings import unit_trouble
+from hooc_perception.io.depth_units import depth_unit_error
 from hooc_perception.ros.messages.conversions import camera_from_messages, depth_from_message
 import numpy as np
 
@@ -68,7 +68,7 @@ class RawFrames:
                 'size_mismatch', f'the depth image of camera {self.name} is {image.width} x '
                 f'{image.height} pixels, but its camera_info is for {camera.width} x '
                 f'{camera.height}; publish both at the same resolution')
-        _refuse('wrong_unit', unit_trouble(depth, image.encoding, max_depth_m))
+        _refuse('wrong_unit', depth_unit_error(depth, image.encoding, max_depth_m))
         _refuse('no_readings', reading_trouble(depth))
         if self.camera is not None and not same_calibration(camera, self.camera):
             self._fusion.forget()

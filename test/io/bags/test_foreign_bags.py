@@ -253,7 +253,7 @@ def test_missing_metadata(tmp_path):
 def test_metadata_that_is_none(tmp_path, content):
     bag = write(tmp_path / 'b', GOOD)
     (bag / 'metadata.yaml').write_text(content)
-    with pytest.raises(HoocError, match='metadata.yaml|damaged or no bag'):
+    with pytest.raises(HoocError, match='metadata.yaml|damaged or not a bag'):
         BagScene(bag)
 
 
@@ -301,7 +301,7 @@ def test_absent_keys_and_null_leave_the_choice_to_the_model(tmp_path):
 
 def test_views_of_a_later_frame_set(tmp_path):
     bag = BagScene(bag_of(tmp_path / 'b', {'world_frame': None}, (1.0, 0.0, 2.0)))
-    bag._table_known = True
+    bag.table_known = True
     assert bag.views()[0].depth[0, 0] == 1
     assert bag.views({'c': 0})[0].depth[0, 0] == 1
     # The second holds no reading, so no frame set is made of it.
@@ -319,7 +319,7 @@ def test_zeros_behind_the_coefficients_and_a_skew_are_taken_as_live_nodes_take_t
                                                 model='rational_polynomial')),
             ('/c/depth/image_raw', IMAGE, depth_image(DEPTH))])
         if accepted:
-            camera, = BagScene(bag)._source_cameras
+            camera, = BagScene(bag).source_cameras
             np.testing.assert_array_equal(camera.D, lens)
             np.testing.assert_array_equal(camera.K, skew)
         else:

@@ -8,11 +8,11 @@ import struct
 
 from hooc_perception.diagnosis.bag import check_bag
 from hooc_perception.errors import HoocError
-from hooc_perception.io.bags import mcap_file
+from hooc_perception.io.bags import mcap_format, mcap_salvage
 from hooc_perception.io.bags.files import iter_messages, topics, TYPES
 from hooc_perception.io.bags.raw_writer import RawBagWriter
 from hooc_perception.io.bags.reader import BagScene
-from hooc_perception.io.bags.salvage import salvaged, write_salvaged
+from hooc_perception.io.bags.salvage import salvage_bag, write_salvaged
 from hooc_perception.io.depth_encodings import decode_depth
 from mcap.reader import make_reader
 from mcap.stream_reader import StreamReader
@@ -63,7 +63,7 @@ def test_an_independent_reader_agrees_with_all_checksums(demo):
 def test_a_bit_that_flips_anywhere_in_the_messages_is_found(demo, tmp_path):
     bag, file = copy(demo, tmp_path)
     data = file.read_bytes()
-    chunks = [(at, length) for opcode, at, length in mcap_file.records(data) if opcode == 6]
+    chunks = [(at, length) for opcode, at, length in mcap_format.records(data) if opcode == 6]
     rng = np.random.default_rng(0)
     for _ in range(20):
         start, length = chunks[rng.integers(len(chunks))]
@@ -84,7 +84,7 @@ def test_a_bit_that_flips_in_the_index_is_found(demo, tmp_path):
 
 
 def test_a_whole_bag_is_salvaged_whole(demo, tmp_path):
-    found = salvaged(demo)
+    found = salvage_bag(demo)
     assert found.notes == []
     write_salvaged(found, tmp_path / 'again')
     assert contents(tmp_path / 'again') == contents(demo)
@@ -96,7 +96,7 @@ def test_a_file_that_was_cut_off_is_saved_up_to_the_cut(demo, tmp_path, share):
     data = file.read_bytes()
     file.write_bytes(data[:int(share * len(data))])
     (bag / 'metadata.yaml').unlink()
-    found = salvaged(bag)
+    found = salvage_bag(bag)
     assert found.notes
     kept = [(m[3], m[0], m[1], m[4], m[2]) for m in found.messages]
     whole = contents(demo)
@@ -118,11 +118,11 @@ def test_what_follows_a_damaged_record_is_found_again(demo, tmp_path):
                              m.topic.latched)
     file = bag / 'long.mcap'
     data = bytearray(file.read_bytes())
-    chunks = [at for opcode, at, _ in mcap_file.records(data) if opcode == 6]
+    chunks = [at for opcode, at, _ in mcap_format.records(data) if opcode == 6]
     assert len(chunks) >= 3
     struct.pack_into('<Q', data, chunks[1] - 8, 2 ** 40)    # its length
     file.write_bytes(data)
-    found = salvaged(bag)
+    found = salvage_bag(bag)
     whole = 3 * len(contents(demo))
     assert whole * 0.4 < len(found.messages) < whole
     assert any('damaged at byte' in note for note in found.notes)
@@ -138,11 +138,11 @@ def test_databases_are_salvaged_row_by_row(tmp_path, demo):
                              m.topic.latched)
     file = next(bag.glob('*.db3'))
     data = file.read_bytes()
-    assert len(salvaged(bag).messages) == 4 * len(contents(demo))
+    assert len(salvage_bag(bag).messages) == 4 * len(contents(demo))
     file.write_bytes(data[:int(0.6 * len(data))])
     with pytest.raises(HoocError):
         list(iter_messages(bag))
-    found = salvaged(bag)
+    found = salvage_bag(bag)
     assert found.notes and len(found.messages) > len(contents(demo))
     (message, *_) = [m for m in found.messages if m[0].endswith('image_raw')]
     image = TYPES.deserialize_cdr(message[2], message[1])
@@ -156,12 +156,12 @@ def test_databases_are_salvaged_row_by_row(tmp_path, demo):
 def test_nothing_is_salvaged_from_nothing(tmp_path, content, suffix):
     file = tmp_path / f'b{suffix}'
     file.write_bytes(content)
-    assert salvaged(file).messages == []
+    assert salvage_bag(file).messages == []
 
 
 def test_no_file_at_all(tmp_path):
     with pytest.raises(HoocError, match='nothing can be salvaged'):
-        salvaged(tmp_path)
+        salvage_bag(tmp_path)
 
 
 @pytest.mark.parametrize('compression', ['zstd', 'lz4'])
@@ -182,7 +182,7 @@ def test_recorded_compression_is_read_and_salvaged(demo, tmp_path, compression):
                                message.publish_time)
         writer.finish()
     assert sorted(m.data for m in iter_messages(path)) == sorted(m[-1] for m in contents(demo))
-    assert len(salvaged(path).messages) == len(contents(demo))
+    assert len(salvage_bag(path).messages) == len(contents(demo))
 
 
 @pytest.mark.parametrize('kind', ['says less', 'says much'])
@@ -192,22 +192,22 @@ def test_a_chunk_that_would_fill_the_memory_is_refused(tmp_path, kind):
     content = struct.pack('<QQQI', 0, 1, size, 0) + struct.pack('<I', 4) + b'zstd' + struct.pack(
         '<Q', len(packed)) + packed
     file = io.BytesIO()
-    file.write(mcap_file.MAGIC)
+    file.write(mcap_format.MAGIC)
     for opcode, body in ((1, struct.pack('<I', 4) + b'ros2' + struct.pack('<I', 0)), (6, content),
                          (15, bytes(4)), (2, bytes(20))):
         file.write(struct.pack('<BQ', opcode, len(body)) + body)
-    file.write(mcap_file.MAGIC)
+    file.write(mcap_format.MAGIC)
     path = tmp_path / 'bomb.mcap'
     path.write_bytes(file.getvalue())
-    with pytest.raises(HoocError, match='no bag of a recorder'):
+    with pytest.raises(HoocError, match='which no recorder writes'):
         topics(path)
-    assert salvaged(path).messages == []
+    assert salvage_bag(path).messages == []
 
 
 def test_messages_that_would_fill_the_memory_are_left_and_a_check_keeps_none(
         tmp_path, monkeypatch):
     limit = 1 << 20
-    monkeypatch.setattr(mcap_file, 'MOST_SALVAGED', limit)
+    monkeypatch.setattr(mcap_salvage, 'MAX_SALVAGED_BYTES', limit)
     size = 100_000
     kinds = TYPES.types
     head = kinds['std_msgs/msg/Header'](kinds['builtin_interfaces/msg/Time'](1, 0), 'x')
@@ -224,18 +224,18 @@ def test_messages_that_would_fill_the_memory_are_left_and_a_check_keeps_none(
         writer.finish()
     path.write_bytes(path.read_bytes()[:-60])
     assert path.stat().st_size < limit / 8
-    kept, counted = salvaged(path), salvaged(path, keep=False)
+    kept, counted = salvage_bag(path), salvage_bag(path, keep=False)
     assert sum(len(m[2]) for m in kept.messages) <= limit and len(kept.messages) == 10
     assert counted.messages == [] and counted.counts == {IMAGE: 10}
-    assert any('the rest is left' in note for note in kept.notes)
+    assert any('the rest is skipped' in note for note in kept.notes)
     text = '\n'.join(f.text for f in check_bag(path))
-    assert 'the rest is left' in text and '10 of them images' in text
+    assert 'the rest is skipped' in text and '10 of them images' in text
 
 
 def test_notes_are_bounded(demo, tmp_path):
     path = tmp_path / 'notes.mcap'
-    path.write_bytes(mcap_file.MAGIC + struct.pack('<BQ', 5, 0) * 5000)
-    assert 0 < len(salvaged(path).notes) <= mcap_file.MOST_NOTES
+    path.write_bytes(mcap_format.MAGIC + struct.pack('<BQ', 5, 0) * 5000)
+    assert 0 < len(salvage_bag(path).notes) <= mcap_salvage.MAX_NOTES
 
 
 def test_files_and_messages_that_are_compressed_whole_are_refused(demo, tmp_path):

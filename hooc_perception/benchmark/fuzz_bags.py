@@ -5,6 +5,7 @@
 import functools
 import shutil
 from types import SimpleNamespace
+from typing import Any
 
 from hooc_perception.benchmark.mutate import damaged
 from hooc_perception.core.types import Camera, DepthView
@@ -20,7 +21,7 @@ import numpy as np
 _W, _H = 32, 24
 
 
-def small_scene():
+def small_scene() -> tuple[Any, Any]:
     """Return (scene, scene set) for write_bag: two small cameras above a table with a step."""
     T = np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 1], [0, 0, 0, 1]])
     K = np.array([[30.0, 0, 15.5], [0, 30, 11.5], [0, 0, 1]])

@@ -90,7 +90,7 @@ def _categories(models: Path, info_file: Path, info: dict[str, Any]) -> dict[int
         name = fields.name(entry.get('name', f'obj_{obj_id:06d}'), f'{info_file}: {obj_id} name')
         result[obj_id] = Category(name, models / f'obj_{obj_id:06d}.ply', MM)
     check_categories(fields.unique([category.name for category in result.values()],
-                                  f'{info_file}: name'), info_file)
+                                  f'{info_file}: name'), str(info_file))
     return result
 
 

@@ -150,7 +150,7 @@ def _categories(path: Path, file: Path, entry: dict[str, Any]) -> tuple[Category
             raise HoocError(f'{where} scale is {scale:g}; give the metres of one model unit')
         result.append(Category(name, mesh, scale))
     check_categories(fields.unique([category.name for category in result], f'{file}: categories'),
-                     file)
+                     str(file))
     return tuple(result)
 
 

@@ -60,7 +60,7 @@ def write_scene_set(path: str | Path, name: str, meshes: Mapping[str, trimesh.Tr
         raise HoocError(f'{path}: the folder is in use; choose a new one or empty it')
     for category in meshes:
         fields.name(category, f'{path}: the name of a category')
-    check_categories(meshes, path)
+    check_categories(meshes, str(path))
     (path / 'models').mkdir(parents=True, exist_ok=True)
     for category, mesh in meshes.items():
         mesh.export(path / 'models' / f'{category}.ply')

@@ -60,6 +60,15 @@ def test_the_page_of_commands_lists_every_command():
     assert not [name for name in cli.COMMANDS if f'| `hooc {name}` |' not in page]
 
 
+@pytest.mark.parametrize('page', PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_imports_of_the_page_exist(page):
+    blocks = re.findall(r'```python\n(.*?)```', page.read_text(), re.S)
+    for module, names in re.findall(r'^from (hooc_perception[\w.]*) import (.+)$',
+                                    '\n'.join(blocks), re.M):
+        found = importlib.import_module(module)
+        assert not [name for name in names.split(', ') if not hasattr(found, name)], module
+
+
 def test_every_direct_dependency_is_explained():
     text = (ROOT / 'docs' / 'libraries.md').read_text().lower()
     project = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']

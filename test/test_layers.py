@@ -38,7 +38,7 @@ ALLOWED = {
             'hooc_perception.io.depth_encodings', 'hooc_perception.io.depth_units',
             'hooc_perception.io.frame_sets'},
     'nodes': {'numpy', 'rclpy', 'hooc_perception.core', 'hooc_perception.ros',
-              'hooc_perception.io.frame_sets', 'hooc_perception.trained.folder',
+              'hooc_perception.io.frame_sets', 'hooc_perception.trained',
               'hooc_perception.parser'},
     'benchmark': {'numpy', 'scipy', 'cv2', 'open3d', 'sklearn', 'manifold3d', 'trimesh',
                   'rclpy', 'psutil', 'matplotlib', 'hooc_perception.core',
@@ -48,10 +48,10 @@ ALLOWED = {
                   'hooc_perception.parser'},
     'experiments': {'numpy', 'hooc_perception.evaluation', 'hooc_perception.io.scenes'},
     'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.io', 'hooc_perception.extras',
-                  'hooc_perception.trained.folder'},
+                  'hooc_perception.trained'},
     'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',
                    'hooc_perception.ros', 'hooc_perception.nodes',
-                   'hooc_perception.trained.folder', 'hooc_perception.io'},
+                   'hooc_perception.trained', 'hooc_perception.io'},
 }
 # Message packages; tf2 and launch exist only on a ROS installation and stand behind guards.
 MESSAGES = {'action_msgs', 'builtin_interfaces', 'diagnostic_msgs', 'geometry_msgs',

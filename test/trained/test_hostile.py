@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Files made by a foe: refused in one sentence, nothing executed, memory bounded."""
+"""Malicious files: rejected in one sentence, nothing executed, memory bounded."""
 
 import copy
 import json
@@ -44,7 +44,7 @@ for path in sys.argv[2:]:
         reader(path)
         text = 'read'
     except HoocError as error:
-        text = 'refused ' + str(error).replace(chr(10), '<newline>')
+        text = 'rejected ' + str(error).replace(chr(10), '<newline>')
     grown = (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) // 1024
     print(path, grown, text, sep='|', flush=True)
 """
@@ -115,7 +115,7 @@ def hostile_meshes():
     return files
 
 
-def test_meshes_of_a_foe_are_refused_and_cost_little(tmp_path):
+def test_malicious_meshes_are_rejected_at_little_cost(tmp_path):
     files = hostile_meshes()
     for name, content in files.items():
         if isinstance(content, tuple):
@@ -124,7 +124,7 @@ def test_meshes_of_a_foe_are_refused_and_cost_little(tmp_path):
         else:
             (tmp_path / name).write_bytes(content)
     outcomes = read_apart('mesh', [tmp_path / name for name in files])
-    assert {n: o for n, o in outcomes.items() if not o[1].startswith('refused')} == {}
+    assert {n: o for n, o in outcomes.items() if not o[1].startswith('rejected')} == {}
     assert {n: o for n, o in outcomes.items() if '<newline>' in o[1] or o[0] > BOUND_MB} == {}
     assert not any('root:' in text for _, text in outcomes.values())
 
@@ -152,7 +152,7 @@ def good(tmp_path_factory):
 
 
 def signed(folder):
-    """Write the sizes and checksums of all files into model.json, as a foe would."""
+    """Write the sizes and checksums of all files into model.json, as an attacker would."""
     import hashlib
     meta = json.loads((folder / 'model.json').read_text())
     for name in meta['files']:
@@ -229,10 +229,10 @@ def hostile_folders(good, tmp_path):
         yield folder
 
 
-def test_model_folders_of_a_foe_are_refused_and_cost_little(good, tmp_path):
+def test_malicious_model_folders_are_rejected_at_little_cost(good, tmp_path):
     folders = list(hostile_folders(good, tmp_path))
     outcomes = read_apart('folder', folders)
-    assert {n: o for n, o in outcomes.items() if not o[1].startswith('refused')} == {}
+    assert {n: o for n, o in outcomes.items() if not o[1].startswith('rejected')} == {}
     assert {n: o for n, o in outcomes.items() if '<newline>' in o[1] or o[0] > BOUND_MB} == {}
     assert not (tmp_path / 'executed').exists() and not Path('executed').exists()
     assert load_model_folder(good).name == 'm'

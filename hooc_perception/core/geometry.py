@@ -2,14 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rigid transforms and pinhole projection. `T_a_b` maps points of frame b into frame a."""
 
+from typing import TYPE_CHECKING
 import zlib
 
+from hooc_perception.core.arrays import AnyArray, Float32Array, Float64Array
 from hooc_perception.errors import HoocError
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+if TYPE_CHECKING:
+    from hooc_perception.core.types import Camera, GenericModel
 
-def matrix_from_pose(translation, rotation_xyzw):
+
+def matrix_from_pose(translation: npt.ArrayLike, rotation_xyzw: npt.ArrayLike) -> Float64Array:
     """Return T_a_b (4, 4) from a translation (3,) in metres and a quaternion (4,) xyzw."""
     T_a_b = np.eye(4)
     T_a_b[:3, :3] = Rotation.from_quat(rotation_xyzw).as_matrix()
@@ -17,12 +23,12 @@ def matrix_from_pose(translation, rotation_xyzw):
     return T_a_b
 
 
-def pose_from_matrix(T_a_b):
+def pose_from_matrix(T_a_b: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Return (translation (3,), rotation_xyzw (4,) with w >= 0) of a (4, 4) transform."""
     return T_a_b[:3, 3].copy(), Rotation.from_matrix(T_a_b[:3, :3]).as_quat(canonical=True)
 
 
-def canonical_pose(T_a_b):
+def canonical_pose(T_a_b: Float64Array) -> Float64Array:
     """
     Return the (4, 4) transform next to T_a_b that survives a trip through a quaternion.
 
@@ -37,7 +43,7 @@ def canonical_pose(T_a_b):
     return matrix_from_pose(T_a_b[:3, 3], q * q[np.argmax(np.abs(q))] + 0.0)
 
 
-def inverse(T_a_b):
+def inverse(T_a_b: Float64Array) -> Float64Array:
     """Return T_b_a of a rigid (4, 4) transform."""
     T_b_a = np.eye(4)
     T_b_a[:3, :3] = T_a_b[:3, :3].T
@@ -45,37 +51,38 @@ def inverse(T_a_b):
     return T_b_a
 
 
-def transform(T_a_b, points_b):
+def transform(T_a_b: Float64Array, points_b: AnyArray) -> Float64Array:
     """Return points (n, 3) of frame b in frame a."""
     return points_b @ T_a_b[:3, :3].T + T_a_b[:3, 3]
 
 
-def project(K, points_camera):
+def project(K: Float64Array, points_camera: Float64Array) -> tuple[Float64Array, Float64Array]:
     """Return (u, v) float arrays (n,) of points (n, 3) in the optical frame, z > 0."""
     z = points_camera[:, 2]
     return (K[0, 0] * points_camera[:, 0] / z + K[0, 2],
             K[1, 1] * points_camera[:, 1] / z + K[1, 2])
 
 
-def rays(K, height, width):
+def rays(K: Float64Array, height: int, width: int) -> Float64Array:
     """Return (H, W, 3) float64 directions with z = 1 through the pixel centres."""
     u, v = np.meshgrid(np.arange(width), np.arange(height))
     return np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(u.shape)], -1)
 
 
-def back_project(depth, camera):
+def back_project(depth: Float32Array, camera: 'Camera') -> Float64Array:
     """Return (H, W, 3) float64 world points of a rectified (H, W) depth image; NaN stays."""
     points = rays(camera.K, *depth.shape) * depth[..., None]
     return transform(camera.T_world_camera, points)
 
 
-def posed_vertices(model, translation, rotation_xyzw, size):
+def posed_vertices(model: 'GenericModel', translation: npt.ArrayLike,
+                   rotation_xyzw: npt.ArrayLike, size: npt.ArrayLike) -> Float64Array:
     """Return (V, 3) world vertices of a GenericModel scaled to `size` and posed."""
     scaled = model.vertices * (np.asarray(size, np.float64) / np.maximum(model.extents, 1e-9))
     return transform(matrix_from_pose(translation, rotation_xyzw), scaled)
 
 
-def stage_rng(seed, stage, *keys):
+def stage_rng(seed: int, stage: str, *keys: int) -> np.random.Generator:
     """
     Return the numpy Generator of one stage, independent of what other stages drew.
 

@@ -2,21 +2,27 @@
 # SPDX-License-Identifier: Apache-2.0
 """Remember what is derived from a generic model for as long as the model lives."""
 
+from collections.abc import Callable
 import functools
+from typing import TypeVar
 import weakref
 
+from hooc_perception.core.types import GenericModel
 
-def per_model(derive):
+T = TypeVar('T')
+
+
+def per_model(derive: Callable[[GenericModel], T]) -> Callable[[GenericModel], T]:
     """
-    Decorate a function of one GenericModel so that each model is worked out once.
+    Decorate a function of one GenericModel so that it is computed once per model.
 
     Models are frozen and hold arrays, so they are told apart by identity; an entry goes when
     its model does.
     """
-    known = {}
+    known: dict[int, T] = {}
 
     @functools.wraps(derive)
-    def remembered(model):
+    def remembered(model: GenericModel) -> T:
         key = id(model)
         if key not in known:
             known[key] = derive(model)

@@ -2,15 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """The one depth renderer: training, candidates, parsing and reports all use it."""
 
+from collections.abc import Sequence
+
+from hooc_perception.core.arrays import Float32Array, Float64Array, Int32Array
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.kernels import raster
 from hooc_perception.core.memo import per_model
+from hooc_perception.core.types import Camera, GenericModel
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 
-def projected(vertices_world, camera):
+def projected(vertices_world: Float64Array, camera: Camera) -> Float64Array:
     """Return (V, 3) float64 rows (u, v, z) of world vertices (V, 3) in a rectified camera."""
     T_camera_world = inverse(camera.T_world_camera)
     K = camera.K
@@ -20,7 +24,8 @@ def projected(vertices_world, camera):
         K[0, 0], K[1, 1], K[0, 2], K[1, 2])
 
 
-def render_depth(meshes, camera):
+def render_depth(meshes: Sequence[tuple[Float64Array, Int32Array]], camera: Camera,
+                 ) -> tuple[Float32Array, Int32Array]:
     """
     Return (depth, ids) of posed meshes in one rectified camera; nearest wins.
 
@@ -35,7 +40,8 @@ def render_depth(meshes, camera):
     return depth, ids
 
 
-def render_patch(vertices_world, faces, camera):
+def render_patch(vertices_world: Float64Array, faces: Int32Array, camera: Camera,
+                 ) -> tuple[Int32Array, Float32Array]:
     """
     Return (pixels, depth) that one posed mesh covers: flat indices (n,) int32, metres (n,).
 
@@ -52,7 +58,7 @@ def render_patch(vertices_world, faces, camera):
 
 
 @per_model
-def is_closed(model):
+def is_closed(model: GenericModel) -> bool:
     """
     Return whether a GenericModel is made of closed surfaces that are all wound outwards.
 

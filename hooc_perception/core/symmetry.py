@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rotations that leave a generic model as it is, from the axis orders of GenericModel."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 import functools
 
+from hooc_perception.core.arrays import Float64Array, Int64Array
+from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
+import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
 # A full turn in this many steps moves no point of a model by more than 0.01 of its diameter
@@ -20,14 +24,15 @@ SAME_SCALE = 0.1
 MARGIN = 1e-12
 
 
-def _about(axis, angles):
+def _about(axis: int, angles: npt.ArrayLike) -> Float64Array:
     """Return (n, 3, 3) rotations by `angles` (n,) radians about model axis 0, 1 or 2."""
+    angles = np.asarray(angles, np.float64)
     vectors = np.zeros((len(angles), 3))
     vectors[:, axis] = angles
     return Rotation.from_rotvec(vectors).as_matrix()
 
 
-def _closure(generators):
+def _closure(generators: Sequence[Float64Array]) -> Float64Array | None:
     """Return (n, 3, 3), the group that rotations generate, identity first; None if too large."""
     group = [np.eye(3)]
     fresh = list(group)
@@ -46,10 +51,12 @@ def _closure(generators):
 
 
 @functools.lru_cache(maxsize=256)
-def _rotations(orders):
+def _rotations(orders: tuple[int, ...]) -> Float64Array:
     continuous = [axis for axis in range(3) if orders[axis] == 0]
     if len(continuous) > 1:
-        return _closure([_about(a, [np.pi / 2])[0] for a in range(3)])
+        cube = _closure([_about(a, [np.pi / 2])[0] for a in range(3)])
+        assert cube is not None     # 24 rotations
+        return cube
     group = _finite(orders)
     if not continuous:
         return group
@@ -58,7 +65,7 @@ def _rotations(orders):
     return np.concatenate([turns, *[turns @ flip for flip in flips]])
 
 
-def _finite(orders):
+def _finite(orders: tuple[int, ...]) -> Float64Array:
     """Return (n, 3, 3), the group of the axes of finite order."""
     group = _closure([_about(axis, [2 * np.pi / orders[axis]])[0]
                       for axis in range(3) if orders[axis] > 1])
@@ -71,7 +78,7 @@ def _finite(orders):
         for axis in range(3) if orders[axis] > 1)])
 
 
-def symmetry_rotations(symmetry):
+def symmetry_rotations(symmetry: Sequence[int] | np.ndarray) -> Float64Array:
     """
     Return (n, 3, 3) float64 rotations of the model onto itself, identity first.
 
@@ -83,12 +90,13 @@ def symmetry_rotations(symmetry):
     return _rotations(tuple(int(order) for order in symmetry))
 
 
-def is_ball(symmetry):
+def is_ball(symmetry: npt.ArrayLike) -> bool:
     """Return whether every rotation leaves the model as it is."""
     return int(np.sum(np.asarray(symmetry) == 0)) > 1
 
 
-def rotation_error(R_est, R_true, symmetry=(1, 1, 1)):
+def rotation_error(R_est: Float64Array, R_true: Float64Array,
+                   symmetry: Sequence[int] | np.ndarray = (1, 1, 1)) -> float:
     """
     Return the least angle, radians, from R_true to R_est over the model's symmetries.
 
@@ -112,7 +120,8 @@ def rotation_error(R_est, R_true, symmetry=(1, 1, 1)):
     return float(np.arccos(np.clip((trace.max() - 1) / 2, -1.0, 1.0)))
 
 
-def half_turns(objects, models):
+def half_turns(objects: Candidates, models: Sequence[GenericModel],
+               ) -> tuple[Candidates, Int64Array]:
     """
     Return (Candidates, rows): objects turned by half a turn about each axis of their models.
 
@@ -133,7 +142,10 @@ def half_turns(objects, models):
     return replace(objects.take(rows), rotation_xyzw=np.array(turned).reshape(-1, 4)), rows
 
 
-def nearest_equivalent(R, scale, symmetry, R_reference=None):
+def nearest_equivalent(R: Float64Array, scale: npt.ArrayLike,
+                       symmetry: Sequence[int] | np.ndarray,
+                       R_reference: Float64Array | None = None,
+                       ) -> tuple[Float64Array, Float64Array]:
     """
     Return (R', scale') that pose the model alike and are turned least from a reference.
 
@@ -159,7 +171,8 @@ def nearest_equivalent(R, scale, symmetry, R_reference=None):
     return R @ best, np.einsum('ji,j,ji->i', best, scale, best)
 
 
-def canonical_objects(objects, models, references=None):
+def canonical_objects(objects: Candidates, models: Sequence[GenericModel],
+                      references: Sequence[Float64Array | None] | None = None) -> Candidates:
     """
     Return Candidates that look the same, each turned least from a reference.
 
@@ -182,7 +195,8 @@ def canonical_objects(objects, models, references=None):
     return replace(objects, rotation_xyzw=rotation, size=size)
 
 
-def _turns(M, scale, orders):
+def _turns(M: Float64Array, scale: Float64Array, orders: tuple[int, ...],
+           ) -> Iterator[Float64Array]:
     """
     Yield the symmetries of a scaled model among which the one nearest to a reference is.
 
@@ -211,13 +225,13 @@ def _turns(M, scale, orders):
             yield from (turn @ flip for turn in _about(axis, np.arange(4) * np.pi / 2))
 
 
-def _alike(scale):
+def _alike(scale: Float64Array) -> bool:
     """Return whether scales differ by no more than SAME_SCALE."""
-    return scale.max() - scale.min() <= SAME_SCALE * scale.max()
+    return bool(scale.max() - scale.min() <= SAME_SCALE * scale.max())
 
 
-def _fits(S, scale):
+def _fits(S: Float64Array, scale: Float64Array) -> bool:
     """Return whether a scaled model still is the same after the turn S of the generic one."""
     turned = S.T @ np.diag(scale) @ S
     off = np.abs(turned - np.diag(np.diag(turned)))
-    return off.max() <= 0.5 * SAME_SCALE * scale.max()
+    return bool(off.max() <= 0.5 * SAME_SCALE * scale.max())

@@ -11,6 +11,15 @@ z forward). Pixel centres have integer coordinates.
 
 from dataclasses import dataclass, field, replace
 
+from hooc_perception.core.arrays import (
+    AnyArray,
+    BoolArray,
+    Float32Array,
+    Float64Array,
+    Int32Array,
+    UInt8Array,
+    UInt16Array,
+)
 from hooc_perception.core.geometry import matrix_from_pose
 import numpy as np
 
@@ -29,9 +38,9 @@ class Camera:
     name: str
     width: int
     height: int
-    K: np.ndarray
-    D: np.ndarray
-    T_world_camera: np.ndarray
+    K: Float64Array
+    D: Float64Array
+    T_world_camera: Float64Array
     distortion_model: str = 'plumb_bob'
 
 
@@ -40,7 +49,7 @@ class DepthView:
     """One raw depth image: `depth` (H, W) float32 metres, NaN = none, still distorted."""
 
     camera: Camera
-    depth: np.ndarray
+    depth: Float32Array
 
 
 @dataclass(frozen=True)
@@ -48,7 +57,7 @@ class RectifiedView:
     """One undistorted depth image: `depth` (H, W) float32 metres, NaN = none; camera.D = 0."""
 
     camera: Camera
-    depth: np.ndarray
+    depth: Float32Array
 
 
 @dataclass(frozen=True)
@@ -65,10 +74,10 @@ class ObservedView:
     """
 
     camera: Camera
-    depth: np.ndarray
-    background: np.ndarray
-    foreground: np.ndarray
-    table: np.ndarray
+    depth: Float32Array
+    background: Float32Array
+    foreground: BoolArray
+    table: BoolArray
 
 
 @dataclass(frozen=True)
@@ -80,7 +89,7 @@ class Observation:
     :ivar noise_m: standard deviation of the measured heights of the table top.
     """
 
-    views: tuple
+    views: tuple[ObservedView, ...]
     noise_m: float
 
 
@@ -95,9 +104,9 @@ class PixelProbabilities:
         Pixels that are not listed are background with certainty.
     """
 
-    camera: np.ndarray
-    uv: np.ndarray
-    p: np.ndarray
+    camera: UInt8Array
+    uv: UInt16Array
+    p: UInt8Array
 
 
 @dataclass(frozen=True)
@@ -112,34 +121,34 @@ class Candidates:
     :ivar score: (n,) float32, the larger the better; comparable within a category.
     """
 
-    category: np.ndarray
-    translation: np.ndarray
-    rotation_xyzw: np.ndarray
-    size: np.ndarray
-    score: np.ndarray
+    category: UInt16Array
+    translation: Float64Array
+    rotation_xyzw: Float64Array
+    size: Float32Array
+    score: Float32Array
 
-    def __len__(self):
+    def __len__(self) -> int:
         """Return the number of candidates."""
         return len(self.category)
 
     @staticmethod
-    def empty():
+    def empty() -> 'Candidates':
         """Return a set without members."""
         return Candidates(np.zeros(0, np.uint16), np.zeros((0, 3)), np.zeros((0, 4)),
                           np.zeros((0, 3), np.float32), np.zeros(0, np.float32))
 
-    def take(self, index):
+    def take(self, index: 'AnyArray | list[int]') -> 'Candidates':
         """Return the rows that `index` (integers or bool mask) names."""
         return Candidates(self.category[index], self.translation[index],
                           self.rotation_xyzw[index], self.size[index], self.score[index])
 
-    def extended(self, other):
+    def extended(self, other: 'Candidates') -> 'Candidates':
         """Return these rows followed by the rows of `other`."""
         return Candidates(*(np.concatenate([getattr(self, name), getattr(other, name)])
                             for name in ('category', 'translation', 'rotation_xyzw', 'size',
                                          'score')))
 
-    def T_world_model(self, i):
+    def T_world_model(self, i: int) -> Float64Array:
         """Return the (4, 4) rigid transform of row i; scale by `size / model.extents` first."""
         return matrix_from_pose(self.translation[i], self.rotation_xyzw[i])
 
@@ -147,7 +156,7 @@ class Candidates:
 @dataclass(frozen=True)
 class GenericModel:
     """
-    One category's generic mesh, cleaned and centred, and what is derived from it once.
+    One category's generic mesh, cleaned and centred, with everything derived from it.
 
     :ivar vertices: (V, 3) float64 metres, bounding-box centre at the origin.
     :ivar faces: (F, 3) int32.
@@ -164,19 +173,19 @@ class GenericModel:
     """
 
     name: str
-    vertices: np.ndarray
-    faces: np.ndarray
-    extents: np.ndarray
-    surface_points: np.ndarray
-    surface_normals: np.ndarray
-    interior_points: np.ndarray
+    vertices: Float64Array
+    faces: Int32Array
+    extents: Float64Array
+    surface_points: Float32Array
+    surface_normals: Float32Array
+    interior_points: Float32Array
     volume: float
-    rest_rotations: np.ndarray
-    rest_probability: np.ndarray
-    symmetry: np.ndarray
+    rest_rotations: Float64Array
+    rest_probability: Float64Array
+    symmetry: Int32Array
 
     @property
-    def longest_side(self):
+    def longest_side(self) -> float:
         """Return the longest side of the bounding box, metres: its size in the paper."""
         return float(np.max(self.extents))
 
@@ -190,7 +199,7 @@ class Energy:
     overlap: float
 
     @property
-    def total(self):
+    def total(self) -> float:
         """Return the sum of the terms."""
         return self.depth + self.probability + self.overlap
 
@@ -198,9 +207,10 @@ class Energy:
 @dataclass(frozen=True)
 class ParsedScene:
     """
-    The answer for one frame set, with its evidence.
+    The result of one frame set, with its evidence.
 
-    :ivar objects: the chosen candidates, refined; `score` in [0, 1], see core.parsing.calibration.
+    :ivar objects: the chosen candidates, refined; `score` in [0, 1], see parsing/answer.py and
+        parsing/calibration.py.
     :ivar energy: Eq. 1 of the chosen subset (for every profile, so that they compare).
     :ivar visible_ratio: (n,) float32 share of each object's rendered pixels that are in sight.
     :ivar residual_m: (n,) float32 mean absolute depth residual over the pixels where it agrees.
@@ -215,16 +225,16 @@ class ParsedScene:
 
     objects: Candidates
     energy: Energy
-    visible_ratio: np.ndarray
-    residual_m: np.ndarray
-    energy_delta: np.ndarray
-    n_views: np.ndarray
+    visible_ratio: Float32Array
+    residual_m: Float32Array
+    energy_delta: Float32Array
+    n_views: UInt8Array
     pool: Candidates
     converged: bool = True
-    seconds: dict = field(default_factory=dict)
-    sigma_t: np.ndarray | None = None
-    sigma_r: np.ndarray | None = None
+    seconds: dict[str, float] = field(default_factory=dict)
+    sigma_t: Float32Array | None = None
+    sigma_r: Float32Array | None = None
 
-    def timed(self, **seconds):
+    def timed(self, **seconds: float) -> 'ParsedScene':
         """Return a copy whose `seconds` also hold the given stages."""
         return replace(self, seconds={**self.seconds, **seconds})

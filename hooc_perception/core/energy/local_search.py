@@ -3,18 +3,46 @@
 """
 Greedy best flip, then iterated local search with flips, swaps and kicks.
 
-It knows no geometry, only the energy's interface in core/energy/compositor.py: n, mask, value,
-deltas(), flip(k) and reset(mask). It can be stopped at any time and then holds the best subset
-seen.
+It knows no geometry, only the interface of `SearchableEnergy`. It can be stopped at any time and
+then holds the best subset seen.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
+from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.config import Config, param
 import numpy as np
 
 # Less than this is the rounding of sums, not a gain.
 TINY = 1e-10
+# Whether time is up.
+Stop = Callable[[], bool]
+
+
+class SearchableEnergy(Protocol):
+    """What a search needs from an energy over the subsets of n candidates; see compositor.py."""
+
+    n: int
+
+    @property
+    def mask(self) -> BoolArray:
+        """Return a copy of the current subset, (n,) bool."""
+        ...
+
+    @property
+    def value(self) -> float:
+        """Return the energy of the current subset."""
+        ...
+
+    def deltas(self) -> Float64Array:
+        """Return (n,) float64: the change by each flip, inf where it is not allowed."""
+        ...
+
+    def flip(self, k: int) -> None:
+        """Add candidate k to the subset, or remove it."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -22,10 +50,10 @@ class LocalSearchConfig(Config):
     """Parameters of the iterated local search."""
 
     patience: int = param(
-        30, 'kicks in a row without a gain after which the search has converged; as good as '
-        'long runs in 36 of 36 trials on pools of 125 candidates', low=0)
-    kick: int = param(5, 'most random flips of a kick; each kick draws 1 to this many', low=1)
-    swaps: bool = param(True, 'whether a member may be exchanged for an outsider in one step')
+        30, 'Kicks in a row without a gain after which the search has converged; as good as '
+        'long runs in 36 of 36 trials on pools of 125 candidates.', low=0)
+    kick: int = param(5, 'Most random flips of a kick; each kick draws 1 to this many.', low=1)
+    swaps: bool = param(True, 'Whether a member may be exchanged for an outsider in one step.')
 
 
 @dataclass(frozen=True)
@@ -39,7 +67,7 @@ class SearchResult:
     :ivar kicks: number of kicks tried.
     """
 
-    mask: np.ndarray
+    mask: BoolArray
     energy: float
     converged: bool
     kicks: int
@@ -49,11 +77,11 @@ class OutOfTimeError(Exception):
     """Raised and caught in here when `stop` says that time is up."""
 
 
-def greedy(energy, stop=None):
+def greedy(energy: SearchableEnergy, stop: Stop | None = None) -> None:
     """
     Flip whatever lowers the energy most until nothing does.
 
-    A member that costs nothing to leave out (nobody sees it) is left out.
+    A member that no pixel shows, and that costs nothing to leave out, is left out.
 
     :raises OutOfTimeError: where `stop` says so.
     """
@@ -69,14 +97,14 @@ def greedy(energy, stop=None):
             raise OutOfTimeError
 
 
-def best_swap(energy, stop=None):
+def best_swap(energy: SearchableEnergy, stop: Stop | None = None) -> bool:
     """
     Make the best exchange of one member for one outsider if it lowers the energy.
 
     :return: whether it did.
     """
     best, pair = -TINY, None
-    for a in np.flatnonzero(energy.mask):
+    for a in np.flatnonzero(energy.mask).tolist():
         leaves = energy.deltas()[a]
         energy.flip(a)
         deltas = energy.deltas()
@@ -95,21 +123,24 @@ def best_swap(energy, stop=None):
     return True
 
 
-def descend(energy, config=LocalSearchConfig(), stop=None):
-    """Flip and swap down to a subset that no flip and no swap betters."""
+def descend(energy: SearchableEnergy, config: LocalSearchConfig = LocalSearchConfig(),
+            stop: Stop | None = None) -> None:
+    """Flip and swap until no flip and no swap lowers the energy."""
     while True:
         greedy(energy, stop)
         if not config.swaps or not best_swap(energy, stop):
             return
 
 
-def local_search(energy, rng, config=LocalSearchConfig(), stop=None):
+def local_search(energy: SearchableEnergy, rng: np.random.Generator,
+                 config: LocalSearchConfig = LocalSearchConfig(), stop: Stop | None = None,
+                 ) -> SearchResult:
     """
     Minimise an energy from its current subset; see the module.
 
-    Each kick flips a few things at random, half of the time members and half of the time
-    outsiders, and lets the others settle; the search goes down from there and comes back
-    unless that is no worse.
+    Each kick flips a few candidates at random, half of the time members and half of the time
+    outsiders, and lets the others settle; the search descends from there and returns unless the
+    result is no worse.
 
     :param stop: callable without arguments that returns True when time is up.
     :return: SearchResult; the energy is left at the best subset.
@@ -139,12 +170,12 @@ def local_search(energy, rng, config=LocalSearchConfig(), stop=None):
     return SearchResult(best_mask, float(best_value), converged, kicks)
 
 
-def _kick(energy, rng, most):
+def _kick(energy: SearchableEnergy, rng: np.random.Generator, most: int) -> None:
     """
-    Flip one to `most` random things, members or outsiders with equal chance.
+    Flip one to `most` random candidates, members or outsiders with equal chance.
 
     The others then settle by best flips while the kicked ones are held: a new member would
-    otherwise be the first to go, before those that it makes superfluous have gone.
+    otherwise be the first to leave, before those that it makes superfluous.
     """
     held = np.zeros(energy.n, bool)
     for _ in range(rng.integers(1, most + 1)):
@@ -163,7 +194,7 @@ def _kick(energy, rng, most):
         energy.flip(k)
 
 
-def _go_to(energy, mask):
+def _go_to(energy: SearchableEnergy, mask: BoolArray) -> None:
     """Flip whatever differs from `mask`."""
     for k in np.flatnonzero(energy.mask != mask):
         energy.flip(int(k))

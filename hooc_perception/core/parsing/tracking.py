@@ -1,17 +1,20 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which object of this frame set is which of the last ones: lasting ids, steady orientations."""
+"""Objects of successive frame sets get lasting ids and steady orientations."""
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from hooc_perception.core.arrays import Float64Array, UInt32Array
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.symmetry import canonical_objects, rotation_error
+from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-# A turn by a radian counts as much as a way of this share of the longest side: it tells two
-# neighbours of one category apart, but a wrong orientation alone makes no new object.
+# A rotation by a radian counts as much as a translation by this share of the longest side: it
+# tells two neighbours of one category apart, but a wrong orientation alone makes no new object.
 TURN_WEIGHT = 0.1
 
 
@@ -20,10 +23,10 @@ class TrackConfig(Config):
     """Parameters of the tracker."""
 
     track_ttl_s: float = param(30.0, 'An object that is not found for longer than this is '
-                               'forgotten, and a new one if it comes back; 0: every answer '
-                               'stands for itself, with new ids.', 's', 0.0, 3600.0, runtime=True)
-    track_reach_m: float = param(0.15, 'An object that is found farther than this from where it '
-                                 'was is a new one.', 'm', 0.001, 10.0, runtime=True)
+                               'forgotten and gets a new id if it returns; 0: every result has '
+                               'new ids.', 's', 0.0, 3600.0, runtime=True)
+    track_reach_m: float = param(0.15, 'An object that moved farther than this gets a new id.',
+                                 'm', 0.001, 10.0, runtime=True)
 
 
 @dataclass
@@ -31,38 +34,39 @@ class _Track:
     """An object as it was last seen."""
 
     category: int
-    translation: np.ndarray
-    R: np.ndarray
+    translation: Float64Array
+    R: Float64Array
     stamp_ns: int
 
 
 class Tracker:
     """
-    Give the objects of successive answers lasting ids and steady orientations.
+    Give the objects of successive results lasting ids and steady orientations.
 
-    Objects of one category are matched so that all of them together move and turn least; turns
-    that a symmetric model cannot tell apart count nothing. A category that changes is another
-    object.
+    Objects of one category are matched so that the sum of their motions is least; rotations that
+    leave a symmetric model as it is count nothing. An object whose category changes gets a new id.
 
     :param models: tuple of GenericModel; class id c is models[c - 1].
     """
 
-    def __init__(self, models, config=TrackConfig()):
-        """Remember nothing yet."""
+    def __init__(self, models: Sequence[GenericModel],
+                 config: TrackConfig = TrackConfig()) -> None:
         self.models, self.config = models, config
-        self._tracks, self._next_id, self._last_ns = {}, 1, None
+        self._tracks: dict[int, _Track] = {}
+        self._next_id = 1
+        self._last_ns: int | None = None
 
-    def forget(self):
-        """Forget all objects; their ids do not come back."""
+    def forget(self) -> None:
+        """Forget all objects; their ids are not used again."""
         self._tracks, self._last_ns = {}, None
 
-    def update(self, stamp_ns, objects):
+    def update(self, stamp_ns: int, objects: Candidates) -> tuple[UInt32Array, Candidates]:
         """
-        Return (ids (n,) uint32, Candidates) of the next answer.
+        Return (ids (n,) uint32, Candidates) of the next result.
 
-        The objects are the same but for turns that leave them as they are: what was there
-        before is oriented as it was, what is new as little turned from the world's axes as can
-        be. A stamp before the last one means that time was set back: all is forgotten.
+        The objects are the same up to the symmetries of their models: a known object keeps its
+        orientation, a new one is turned as little from the world's axes as possible. A stamp
+        before the last one means that time was set back: all objects are forgotten.
         """
         if self._last_ns is not None and stamp_ns < self._last_ns:
             self.forget()
@@ -71,7 +75,7 @@ class Tracker:
                         if stamp_ns - track.stamp_ns <= self.config.track_ttl_s * 1e9}
         objects = canonical_objects(objects, self.models)
         ids = np.zeros(len(objects), np.uint32)
-        references = [None] * len(objects)
+        references: list[Float64Array | None] = [None] * len(objects)
         if self.config.track_ttl_s > 0:
             for row, number in self._matches(objects):
                 ids[row], references[row] = number, self._tracks[number].R
@@ -85,8 +89,8 @@ class Tracker:
                 Rotation.from_quat(objects.rotation_xyzw[row]).as_matrix(), stamp_ns)
         return ids, objects
 
-    def _matches(self, objects):
-        """Yield (row, id) of the objects that were there before."""
+    def _matches(self, objects: Candidates) -> Iterator[tuple[int, int]]:
+        """Yield (row, id) of the objects that are known already."""
         rotations = [Rotation.from_quat(q).as_matrix() for q in objects.rotation_xyzw]
         for category in np.unique(objects.category):
             rows = np.flatnonzero(objects.category == category)
@@ -103,7 +107,7 @@ class Tracker:
                     far[i, j] = way > self.config.track_reach_m
                     cost[i, j] = way + TURN_WEIGHT * model.longest_side * rotation_error(
                         rotations[row], track.R, model.symmetry)
-            # A match that may not be costs more than all that may together.
+            # A forbidden match costs more than all allowed ones together.
             cost[far] = 1 + cost[~far].sum()
             for i, j in zip(*linear_sum_assignment(cost)):
                 if not far[i, j]:

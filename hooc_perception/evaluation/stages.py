@@ -10,7 +10,6 @@ from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.matching import PosedObject
 from hooc_perception.evaluation.scores import TIGHT_M
 import numpy as np
-from sklearn.metrics import log_loss
 
 # A true object's generic model and the reading may differ this much: rough models.
 AGREE_M = 0.03
@@ -81,6 +80,7 @@ def pixel_scores(probabilities, observation, truths, models):
     if not certain.any():
         return {'pixels': 0, 'accuracy': float('nan'), 'balanced_accuracy': float('nan'),
                 'true_probability': float('nan'), 'log_loss': float('nan'), 'categories': {}}
+    from sklearn.metrics import log_loss  # of the extra `eval`; parse must do without
     true, p = true[certain], probabilities.p[certain].astype(np.float64)
     p = (p + 0.5) / (p + 0.5).sum(1, keepdims=True)
     likely = p.argmax(1)

@@ -18,8 +18,9 @@ from hooc_perception.core.energy.compositor import Compositor
 from hooc_perception.core.energy.images_and_volumes import ImagesAndVolumes
 from hooc_perception.core.energy.overlap import OverlapTerm
 from hooc_perception.core.frame.costs import ObjectCosts
-from hooc_perception.core.frame.evidence import Evidence, PixelLists
+from hooc_perception.core.frame.evidence import Evidence
 from hooc_perception.core.frame.kernels import compare as stat
+from hooc_perception.core.frame.kernels.pixel_lists import PixelLists
 from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
 

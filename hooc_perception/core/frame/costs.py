@@ -5,7 +5,7 @@
 from dataclasses import dataclass
 
 from hooc_perception.core.config import Config, param
-from hooc_perception.core.frame.evidence import PixelWeights
+from hooc_perception.core.frame.kernels.records import PixelWeights
 
 
 @dataclass(frozen=True)

@@ -1,182 +1,208 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""All pixels of all views in a row, and hypotheses held against them."""
+"""The stacked pixels of all views, and hypotheses rendered and compared with them."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 
+from hooc_perception.core.arrays import (
+    AnyArray,
+    Float32Array,
+    Float64Array,
+    Int32Array,
+    Int64Array,
+)
+from hooc_perception.core.frame.field import Cloud
 from hooc_perception.core.frame.kernels import compare as kernel
 from hooc_perception.core.frame.kernels import pixel_lists
+from hooc_perception.core.frame.kernels.pixel_lists import PixelLists
+from hooc_perception.core.frame.kernels.records import (
+    Context,
+    Hypotheses,
+    Meshes,
+    PixelOutput,
+    PixelWeights,
+    RefineSettings,
+    Views,
+)
+from hooc_perception.core.frame.kernels.refine import refine_all
+from hooc_perception.core.frame.pixel_index import first_pixels, rows_of_pixels, stacked_index
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.render import is_closed
+from hooc_perception.core.types import (
+    Candidates,
+    GenericModel,
+    Observation,
+    ObservedView,
+    PixelProbabilities,
+)
 import numpy as np
 
-# What is shown already at each pixel: owner, depth and cost of the nearest and of the next object.
-Context = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
-
-
-@dataclass(frozen=True)
-class PixelWeights:
-    """
-    What a pixel costs; an unexplained foreground pixel costs 1, a visible table pixel 0.
-
-    :ivar tolerance_m: depth residual that costs as much as no explanation, metres.
-    :ivar normal: cost of a perpendicular normal.
-    :ivar category: cost of a category that the classifier rules out.
-    :ivar free: cost of hiding a surface that was measured farther away.
-    """
-
-    tolerance_m: float = 0.03
-    normal: float = 0.4
-    category: float = 0.4
-    free: float = 0.7
-
-
-@dataclass(frozen=True)
-class PixelLists:
-    """
-    The pixels that each of m hypotheses covers alone, as core.energy.compositor takes them.
-
-    :ivar offsets: (m + 1,) int64; entries offsets[k]:offsets[k + 1] belong to row k.
-    :ivar pixel: (E,) int64; depth (E,) float32 metres; cost (E,) float32.
-    """
-
-    offsets: np.ndarray
-    pixel: np.ndarray
-    depth: np.ndarray
-    cost: np.ndarray
-
-    def take(self, rows):
-        """Return the lists of the given rows."""
-        n = np.diff(self.offsets)[rows]
-        at = np.concatenate([[0], np.cumsum(n)])
-        return PixelLists(at, *pixel_lists.packed(self.offsets[:-1][rows], at, self.pixel,
-                                                  self.depth, self.cost))
-
-    def extended(self, other):
-        """Return these rows followed by those of `other`."""
-        return PixelLists(np.concatenate([self.offsets, self.offsets[-1] + other.offsets[1:]]),
-                          *(np.concatenate([getattr(self, f), getattr(other, f)])
-                            for f in ('pixel', 'depth', 'cost')))
+# Cost above which a pixel counts as unexplained.
+UNEXPLAINED = 0.6
 
 
 class Evidence:
     """
-    The views of one frame set, laid out for the kernels; pixels are numbered through.
+    The views of one frame set, laid out for the kernels.
 
-    :param cloud: Cloud of the observation; `patch` (n,) labels of its points.
+    :ivar views: Views, the stacked pixels; `meshes` Meshes of the models.
+    :ivar scale: pixels here per pixel of the full images: costs shrink with them.
+    :ivar row: (P,) int32 row of the cloud that each pixel fell into, -1 = none.
+    :ivar cost_none: (P,) float32 cost of showing nothing; `nothing` the Context without members.
     """
 
-    def __init__(self, observation, probabilities, models, cloud, patch, stride=1):
-        """Flatten and stack every `stride`-th row and column once."""
-        s = stride
-        # Costs in pixels of the full images shrink with the pixels that are looked at.
-        self.scale = 1.0 / (s * s)
-        depth = [v.depth[::s, ::s] for v in observation.views]
-        self.size = np.array([d.shape[::-1] for d in depth], np.int64)
-        self.first = np.concatenate([[0], np.cumsum(self.size.prod(1))]).astype(np.int64)
-        T = [inverse(v.camera.T_world_camera) for v in observation.views]
-        self.K = np.stack([np.asarray(v.camera.K, np.float64) for v in observation.views])
-        self.K[:, :2] /= s
-        self.R = np.ascontiguousarray(np.stack([t[:3, :3] for t in T]))
-        self.t = np.ascontiguousarray(np.stack([t[:3, 3] for t in T]))
+    def __init__(self, observation: Observation, probabilities: PixelProbabilities,
+                 models: Sequence[GenericModel], cloud: Cloud, patch: Int32Array,
+                 stride: int = 1) -> None:
+        """
+        Stack every `stride`-th row and column of all views.
 
-        def flat(images):
-            return np.concatenate([x[::s, ::s].reshape(-1, *x.shape[2:]) for x in images])
-
-        self.depth = flat([v.depth for v in observation.views])
-        self.foreground = flat([v.foreground for v in observation.views])
-        self.normals = flat(cloud.view_normals)
-        self.row = flat(cloud.row)
+        :param cloud: Cloud of the observation; `patch` (n,) labels of its points.
+        """
+        self.scale = 1.0 / (stride * stride)
+        self.row = _stacked(cloud.row, stride)
         self.n_points = len(patch)
-        self.patch = np.where(self.row >= 0, patch[self.row] if len(patch) else -1,
-                              -1).astype(np.int32)
-        self.patch_size = np.maximum(np.bincount(self.patch[self.patch >= 0], minlength=1), 1)
-        self.p = np.ascontiguousarray(probabilities.p)
-        p_row = [np.full(v.depth.shape, -1, np.int32) for v in observation.views]
-        for k, image in enumerate(p_row):
-            mine = np.flatnonzero(probabilities.camera == k)
-            image[probabilities.uv[mine, 1], probabilities.uv[mine, 0]] = mine
-        self.p_row = flat(p_row)
-        self.vertices = np.concatenate([m.vertices for m in models])
-        self.faces = np.concatenate([m.faces for m in models]).astype(np.int32)
-        self.vertex_start = np.cumsum([0] + [len(m.vertices) for m in models])
-        self.face_start = np.cumsum([0] + [len(m.faces) for m in models])
-        self.cost_none = self.foreground.astype(np.float32)
-        nothing = np.full(len(self.depth), np.inf, np.float32)
-        self.nothing = (np.full(len(self.depth), -2, np.int32), nothing, self.cost_none,
-                        nothing, self.cost_none)
-        self._shared = (self.K, self.R, self.t, self.size, self.first, self.depth,
-                        self.foreground, self.normals, self.patch, self.patch_size, self.p,
-                        self.p_row)
-        self._meshes = (self.vertices, self.vertex_start, self.faces, self.face_start,
-                        np.array([is_closed(m) for m in models]))
+        self.views = _views_of(observation, probabilities, cloud, _labels(patch, self.row), stride)
+        self.meshes = _meshes_of(models)
+        self.cost_none: Float32Array = self.views.foreground.astype(np.float32)
+        n = len(self.cost_none)
+        far = np.full(n, np.inf, np.float32)
+        self.nothing = Context(np.full(n, -2, np.int32), far, self.cost_none, far, self.cost_none)
 
-    def explain(self, hypotheses, category, weights, context=None, lists=False, me=None):
+    def compare(self, hypotheses: Float64Array, category: AnyArray, weights: PixelWeights,
+                context: Context | None = None, me: AnyArray | Sequence[int] | None = None,
+                ) -> Float64Array:
         """
-        Hold hypotheses (m, 10) of categories (m,) against all views.
+        Render hypotheses and compare them with all views, each by itself.
 
-        :param context: what is shown already, from `compose`; default nothing.
-        :param lists: also return the pixel lists for core.energy.compositor.
-        :param me: (m,) rows of the hypotheses in `context`, which they are to look through.
-        :return: stats (m, STATS), see kernels/explain.py; with `lists` also a PixelLists.
+        :param hypotheses: (m, 10+) float64, see core/kernels/pose.py.
+        :param category: (m,) class ids.
+        :param context: what is shown already, from `compose`; None = nothing.
+        :param me: (m,) the number of each in `context`, which is looked through; -1 = none.
+        :return: stats (m, STATS) float64; frame/kernels/compare.py names the columns.
         """
-        H = np.ascontiguousarray(hypotheses[:, :10], np.float64)
-        category = np.ascontiguousarray(category, np.int64)
-        context = self.nothing if context is None else context
+        subjects = _hypotheses(hypotheses, category, me)
+        nowhere = PixelOutput(np.full(len(subjects.rows), -1), *_pixel_arrays(0))
+        return kernel.compare_all(subjects, self.views, self.meshes, context or self.nothing,
+                                  _as_floats(weights), nowhere)[0]
 
-        me = np.full(len(H), -1) if me is None else np.asarray(me, np.int64)
-
-        def run(emit_at, pixel, depth, cost):
-            return kernel.explain_all(
-                H, category, me, *self._meshes, context, *self._shared, weights.tolerance_m,
-                weights.normal, weights.category, weights.free, emit_at, pixel, depth, cost)
-
-        if not lists:
-            nowhere = np.full(len(H), -1), np.zeros(0, np.int64), *np.zeros((2, 0), np.float32)
-            return run(*nowhere)[0]
+    def compare_pixels(self, hypotheses: Float64Array, category: AnyArray, weights: PixelWeights,
+                       context: Context | None = None,
+                       me: AnyArray | Sequence[int] | None = None,
+                       ) -> tuple[Float64Array, PixelLists]:
+        """Return the stats of `compare`, and the pixels that each hypothesis covers."""
+        subjects = _hypotheses(hypotheses, category, me)
         # Room for all pixels of their windows; what is never written to takes no memory.
-        room = pixel_lists.window_areas(H, category, *self._meshes[:2], self.K, self.R, self.t,
-                                        self.size)
-        starts = np.cumsum(room) - room
-        loose = [np.empty(room.sum(), t) for t in (np.int64, np.float32, np.float32)]
-        stats, n = run(starts, *loose)
-        offsets = np.concatenate([[0], np.cumsum(n)])
-        return stats, PixelLists(offsets, *pixel_lists.packed(starts, offsets, *loose))
+        room = pixel_lists.window_areas(subjects, self.meshes, self.views)
+        output = PixelOutput(np.cumsum(room) - room, *_pixel_arrays(room.sum()))
+        stats, n = kernel.compare_all(subjects, self.views, self.meshes, context or self.nothing,
+                                      _as_floats(weights), output)
+        return stats, pixel_lists.packed(output.start, n, output.pixel, output.depth, output.cost)
 
-    def compose(self, members, lists):
-        """Return the context that the given rows of PixelLists make, nearest wins."""
-        context = tuple(a.copy() for a in self.nothing)
-        pixel_lists.compose(np.asarray(members, np.int64), lists.offsets, lists.pixel,
-                            lists.depth, lists.cost, *context)
+    def compose(self, members: AnyArray | Sequence[int], lists: PixelLists) -> Context:
+        """Return the Context that the given rows of PixelLists make; nearest wins."""
+        context = Context(*(a.copy() for a in self.nothing))
+        pixel_lists.compose(np.asarray(members, np.int64), lists, context)
         return context
 
-    def unexplained(self, context=None):
+    def unexplained(self, context: Context | None = None) -> Float64Array:
         """Return (n,) float64, the share of each cloud point's pixels that nothing explains."""
         seen = self.row >= 0
-        cost = (self.cost_none if context is None else context[2])[seen]
+        cost = (context or self.nothing).cost[seen]
         total = np.bincount(self.row[seen], minlength=self.n_points)
-        left = np.bincount(self.row[seen], weights=cost > 0.6, minlength=self.n_points)
+        left = np.bincount(self.row[seen], weights=cost > UNEXPLAINED, minlength=self.n_points)
         return left / np.maximum(total, 1)
 
-    def polish(self, hypotheses, category, me, context, weights, complexity, prior, n_steps,
-               sigmas, rng):
+    def refine(self, hypotheses: Float64Array, category: AnyArray, weights: PixelWeights,
+               settings: RefineSettings, rng: np.random.Generator,
+               context: Context | None = None, me: AnyArray | Sequence[int] | None = None,
+               ) -> Float64Array:
         """
-        Return a refined copy of hypotheses (m, 10), each on its own in its `context`.
+        Return a refined copy of hypotheses (m, 10), each by itself in its context.
 
-        :param me: (m,) the rows that they replace there, -1 for none.
-        :param sigmas: first step lengths: metres, radians, log scale.
+        :param rng: draws one seed per hypothesis.
+        :param me: (m,) the numbers of those that they replace in `context`, -1 for none.
         """
-        H = np.ascontiguousarray(hypotheses[:, :10], np.float64).copy()
-        seeds = rng.integers(0, 2**31, len(H))
-        kernel.polish_all(
-            seeds, H, np.ascontiguousarray(category, np.int64), np.asarray(me, np.int64),
-            *self._meshes, context, *self._shared, weights.tolerance_m, weights.normal,
-            weights.category, weights.free, complexity, prior, n_steps, *sigmas)
-        return H
+        # numba compiles a function anew for every combination of types.
+        settings = RefineSettings(float(settings.complexity), float(settings.size_prior),
+                                  int(settings.steps), *map(float, settings[3:]))
+        subjects = _hypotheses(hypotheses, category, me)
+        subjects = subjects._replace(rows=subjects.rows.copy())
+        seeds = rng.integers(0, 2**31, len(subjects.rows))
+        # Nobody asks for SHARE here.
+        views = self.views._replace(patch_size=np.zeros(0, np.int64))
+        refine_all(seeds, subjects, views, self.meshes, context or self.nothing,
+                          _as_floats(weights), settings)
+        return subjects.rows
 
 
-def hypotheses_of(candidates, models):
+def hypotheses_of(candidates: Candidates, models: Sequence[GenericModel]) -> Float64Array:
     """Return (n, 10) float64 hypotheses of Candidates: translation, xyzw, scale per axis."""
     extents = np.array([models[c - 1].extents for c in candidates.category]).reshape(-1, 3)
     return np.column_stack([candidates.translation, candidates.rotation_xyzw,
                             candidates.size / np.maximum(extents, 1e-9)]).astype(np.float64)
+
+
+def _stacked(images: Sequence[AnyArray], stride: int) -> AnyArray:
+    """Return (P, ...), every `stride`-th row and column of images (H, W, ...), stacked."""
+    return np.concatenate([x[::stride, ::stride].reshape(-1, *x.shape[2:]) for x in images])
+
+
+def _labels(patch: Int32Array, row: AnyArray) -> AnyArray:
+    """Return (P,) int32, the smooth patch of each pixel, -1 = none."""
+    return np.where(row >= 0, patch[row] if len(patch) else -1, -1).astype(np.int32)
+
+
+def _views_of(observation: Observation, probabilities: PixelProbabilities, cloud: Cloud,
+              patch: AnyArray, stride: int) -> Views:
+    """Return the Views of an observation."""
+    views: Sequence[ObservedView] = observation.views
+    size = np.array([v.depth[::stride, ::stride].shape[::-1] for v in views], np.int64)
+    K = np.stack([np.asarray(v.camera.K, np.float64) for v in views])
+    K[:, :2] /= stride
+    T_camera_world = [inverse(v.camera.T_world_camera) for v in views]
+    first = first_pixels(views)
+    p_row = rows_of_pixels(stacked_index(views, probabilities.camera, probabilities.uv),
+                           int(first[-1]))
+    p_rows = [p_row[a:b].reshape(v.depth.shape) for a, b, v in zip(first, first[1:], views)]
+    return Views(
+        K=K,
+        R=np.ascontiguousarray(np.stack([T[:3, :3] for T in T_camera_world])),
+        t=np.ascontiguousarray(np.stack([T[:3, 3] for T in T_camera_world])),
+        size=size,
+        first=np.concatenate([[0], np.cumsum(size.prod(1))]).astype(np.int64),
+        depth=_stacked([v.depth for v in views], stride),
+        foreground=_stacked([v.foreground for v in views], stride),
+        normals=_stacked(cloud.view_normals, stride),
+        patch=patch,
+        patch_size=np.maximum(np.bincount(patch[patch >= 0], minlength=1), 1),
+        p=np.ascontiguousarray(probabilities.p),
+        p_row=_stacked(p_rows, stride))
+
+
+def _meshes_of(models: Sequence[GenericModel]) -> Meshes:
+    """Return the Meshes of the models."""
+    return Meshes(
+        vertices=np.concatenate([m.vertices for m in models]),
+        vertex_start=np.cumsum([0] + [len(m.vertices) for m in models]),
+        faces=np.concatenate([m.faces for m in models]).astype(np.int32),
+        face_start=np.cumsum([0] + [len(m.faces) for m in models]),
+        closed=np.array([is_closed(m) for m in models]))
+
+
+def _hypotheses(rows: Float64Array, category: AnyArray,
+                me: AnyArray | Sequence[int] | None) -> Hypotheses:
+    """Return Hypotheses as the kernels take them."""
+    return Hypotheses(np.ascontiguousarray(rows[:, :10], np.float64),
+                      np.ascontiguousarray(category, np.int64),
+                      np.full(len(rows), -1) if me is None else np.asarray(me, np.int64))
+
+
+def _pixel_arrays(n: int) -> tuple[Int64Array, Float32Array, Float32Array]:
+    """Return uninitialized arrays for the pixel, depth and cost of n entries."""
+    return np.empty(n, np.int64), np.empty(n, np.float32), np.empty(n, np.float32)
+
+
+def _as_floats(weights: PixelWeights) -> PixelWeights:
+    """Return the same weights as floats: numba compiles anew for whole numbers."""
+    return PixelWeights(*map(float, weights))

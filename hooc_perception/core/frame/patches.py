@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Split the fused cloud into smooth patches."""
 
+from hooc_perception.core.arrays import Int32Array
+from hooc_perception.core.frame.field import Cloud
 from hooc_perception.core.frame.kernels.patches import smooth_labels
 import numpy as np
 
 
-def smooth_patches(cloud, radius_m=0.009, smooth_cos=0.94, step_m=0.006):
+def smooth_patches(cloud: Cloud, radius_m: float = 0.009, smooth_cos: float = 0.94,
+                   step_m: float = 0.006) -> Int32Array:
     """
     Return (n,) int32 labels: points joined where neighbouring normals agree.
 

@@ -10,7 +10,7 @@ refinement of either leads from there to the single one.
 from collections.abc import Sequence
 
 from hooc_perception.core.arrays import Float64Array, Int64Array
-from hooc_perception.core.kernels.gauss_newton import SCALES
+from hooc_perception.core.kernels.pose import SCALE_LIMITS
 from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -41,7 +41,7 @@ def merged_pairs(objects: Candidates, models: Sequence[GenericModel],
     base = np.array([i for i, _, _ in rows])
     extents = np.array([models[c - 1].extents for c in objects.category[base]])
     like = objects.take(base)
-    size = np.clip([s for _, _, s in rows], SCALES[0] * extents, SCALES[1] * extents)
+    size = np.clip([s for _, _, s in rows], SCALE_LIMITS[0] * extents, SCALE_LIMITS[1] * extents)
     return Candidates(like.category, np.array([t for _, t, _ in rows]), like.rotation_xyzw, size,
                       like.score), np.array(pairs)
 

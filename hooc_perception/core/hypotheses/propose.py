@@ -12,46 +12,28 @@ from dataclasses import dataclass
 from functools import cache
 
 from hooc_perception.core.arrays import Float64Array, Int64Array
-from hooc_perception.core.config import Config, param
 from hooc_perception.core.frame.costs import PixelCosts
-from hooc_perception.core.frame.evidence import Context, Evidence, hypotheses_of
+from hooc_perception.core.frame.evidence import Evidence, hypotheses_of
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.frame.kernels import compare as stat
-from hooc_perception.core.hypotheses.sampling import benefit, distinct, sample
+from hooc_perception.core.frame.kernels.records import Context, RefineSettings
+from hooc_perception.core.hypotheses.config import ProposeConfig
+from hooc_perception.core.hypotheses.sampling import (
+    benefit,
+    non_maximum_suppression,
+    sample,
+    SampleCounts,
+)
+from hooc_perception.core.kernels.pose import QUATERNION, SCALE, SCORE, TRANSLATION, WIDTH
 from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 # Pixels in half resolution that are enough to refine a hypothesis.
 MANY = 120
-
-
-@dataclass(frozen=True)
-class ProposeConfig(Config):
-    """Parameters of stage 3 of the joint method."""
-
-    samples: int = param(10000, 'Poses drawn per category.', low=100)
-    pool: int = param(120, 'Hypotheses per category that are refined in the voxel field.', low=5)
-    refine_steps: int = param(20, 'Refinement steps in the voxel field.', low=0)
-    polish: int = param(15, 'Hypotheses per category that are refined in the images.', low=1)
-    polish_steps: int = param(10, 'Refinement steps in the images.', low=0)
-    per_category: int = param(15, 'Candidates per category.', low=1)
-    round_samples: int = param(4000, 'Poses drawn per category in a round of re-proposal.',
-                               low=10)
-    round_pool: int = param(30, 'Hypotheses per category refined in such a round.', low=1)
-    round_per_category: int = param(6, 'Candidates per category from such a round.', low=1)
-    free_weight: float = param(0.7, 'Weight of a free-space violation in the voxel field.', '',
-                               0.0, 5.0)
-    shell_weight: float = param(0.6, 'Weight of a surface point without free space in front of '
-                                'it.', '', 0.0, 5.0)
-    size_sigma: float = param(0.2, 'Standard deviation of the log size of samples.', '', 0.0, 1.0)
-    size_prior: float = param(0.02, 'Cost of the squared log scale in the voxel field.', '', 0.0,
-                              1.0)
-    tilted: float = param(0.2, 'Share of samples in any rotation instead of a resting one.', '',
-                          0.0, 1.0)
-    distrust: float = param(0.03, 'Least weight of a scene point, whatever the classifier says.',
-                            '', 0.0, 1.0)
-    complexity: float = param(0.1, 'Cost per covered pixel in ranking.', '', 0.0, 2.0)
+# Refinement in the images: cost of the squared log scale per covered pixel, and initial random
+# steps (metres, radians, log scale).
+SIZE_PRIOR, STEP_SIZES = 0.1, (0.006, 0.08, 0.05)
 
 
 @dataclass(frozen=True)
@@ -74,8 +56,8 @@ def propose(frame: Frame, config: ProposeConfig, costs: PixelCosts,
     """
     if frame.field is None:
         return Candidates.empty()
-    H, category = sample(frame, frame.models, config, rng, config.samples, config.pool,
-                         config.refine_steps)
+    H, category = sample(frame.cloud, frame.field, frame.models, config, rng,
+                         SampleCounts(config.samples, config.pool, config.refine_steps))
     return _ranked(frame, _Ranking(config, costs, config.polish, config.per_category), rng, H,
                    category, lambda evidence: evidence.nothing)
 
@@ -88,15 +70,16 @@ def propose_more(frame: Frame, objects: Candidates, config: ProposeConfig, costs
 
     @cache
     def shown(evidence: Evidence) -> Context:
-        _, lists = evidence.explain(hypotheses_of(objects, frame.models), objects.category,
-                                    costs.weights(), lists=True)
+        _, lists = evidence.compare_pixels(hypotheses_of(objects, frame.models),
+                                           objects.category, costs.weights())
         return evidence.compose(np.arange(len(objects)), lists)
 
     left = frame.coarse.unexplained(shown(frame.coarse))
     if not left.any():
         return Candidates.empty()
-    H, category = sample(frame, frame.models, config, rng, config.round_samples,
-                         config.round_pool, config.refine_steps, left + 0.02)
+    H, category = sample(
+        frame.cloud, frame.field, frame.models, config, rng,
+        SampleCounts(config.round_samples, config.round_pool, config.refine_steps), left + 0.02)
     few = config.round_per_category
     return _ranked(frame, _Ranking(config, costs, few, few), rng, H, category, shown)
 
@@ -111,22 +94,23 @@ def _ranked(frame: Frame, ranking: _Ranking, rng: np.random.Generator, H: Float6
     """
     models, config, coarse = frame.models, ranking.config, frame.coarse
     weights = ranking.costs.weights()
-    stats = coarse.explain(H, category, weights, shown(coarse))
+    stats = coarse.compare(H, category, weights, shown(coarse))
     score = benefit(stats, config.complexity)
     # Half of the places go to the field's own order: it knows what the images hide.
-    rows = np.union1d(distinct(H, category, score, models, ranking.n_refine),
-                      distinct(H, category, H[:, 10], models, ranking.n_refine // 2))
+    rows = np.union1d(
+        non_maximum_suppression(H, category, score, models, ranking.n_refine),
+        non_maximum_suppression(H, category, H[:, SCORE], models, ranking.n_refine // 2))
     H, category, covered = H[rows], category[rows], stats[rows, stat.SHOWN]
+    settings = RefineSettings(config.complexity, SIZE_PRIOR, config.polish_steps, *STEP_SIZES)
     # A few hundred pixels determine a pose: large objects need no more, thin ones need them all.
     for evidence, low, high in ((frame.evidence, 0, MANY), (coarse, MANY, 8 * MANY),
                                 (frame.coarsest, 8 * MANY, np.inf)):
         mine = np.flatnonzero((low <= covered) & (covered < high))
         if config.polish_steps and len(mine):
-            H[mine, :10] = evidence.polish(
-                H[mine], category[mine], np.full(len(mine), -1), shown(evidence), weights,
-                config.complexity, 0.1, config.polish_steps, (0.006, 0.08, 0.05), rng)
-    score = benefit(coarse.explain(H, category, weights, shown(coarse)), config.complexity)
-    rows = distinct(H, category, score, models, ranking.n_keep)
+            H[mine, :WIDTH] = evidence.refine(H[mine], category[mine], weights, settings, rng,
+                                              shown(evidence))
+    score = benefit(coarse.compare(H, category, weights, shown(coarse)), config.complexity)
+    rows = non_maximum_suppression(H, category, score, models, ranking.n_keep)
     return candidates_of(H[rows], category[rows], score[rows], models)
 
 
@@ -134,6 +118,7 @@ def candidates_of(H: Float64Array, category: Int64Array, score: Float64Array,
                   models: tuple[GenericModel, ...]) -> Candidates:
     """Return Candidates from hypotheses (m, 10+), class ids and scores."""
     extents = np.array([models[c - 1].extents for c in category]).reshape(-1, 3)
-    return Candidates(category.astype(np.uint16), H[:, :3].copy(),
-                      Rotation.from_quat(H[:, 3:7]).as_quat() if len(H) else H[:, 3:7].copy(),
-                      (H[:, 7:10] * extents).astype(np.float32), score.astype(np.float32))
+    return Candidates(category.astype(np.uint16), H[:, TRANSLATION].copy(),
+                      Rotation.from_quat(H[:, QUATERNION]).as_quat() if len(H)
+                      else H[:, QUATERNION].copy(),
+                      (H[:, SCALE] * extents).astype(np.float32), score.astype(np.float32))

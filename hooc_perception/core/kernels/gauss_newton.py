@@ -1,46 +1,56 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Pull a posed, scaled model onto the seen surface: one Gauss-Newton step in nine unknowns.
+One Gauss-Newton step of a posed, scaled model towards the measured surface.
 
-The unknowns are translation (3, world), rotation (3, world axes through the model's centre) and
-log scale (3, model axes); the residuals are point-to-plane distances along measured normals.
-Random steps (kernels/hypotheses.py, explain.py) see all of the cost but need dozens of trials to
-find where to go; a pull sees only the agreeing surface but knows the way. They take turns.
+The nine unknowns are translation (3, metres, world), rotation (3, radians, about world axes
+through the model's centre) and log scale (3, model axes). The residuals r are distances along
+measured normals (point to plane); with J their derivatives and w their weights, the step solves
+
+    (sum w J J^T + damping) step = -sum w r J
+
+Random steps (core/kernels/pose.py) see the whole cost but need dozens of trials to find a way
+down; a Gauss-Newton step sees only the points that agree but has a descent direction. Refinement
+alternates between them.
 """
 
+from hooc_perception.core.arrays import Float64Array
+from hooc_perception.core.kernels.linalg import cholesky_clamped, cholesky_solve
+from hooc_perception.core.kernels.pose import quaternion_multiply, QW, QX, SX, TX, WIDTH
 import numba as nb
 import numpy as np
 
-# Longest step that the linearisation is trusted for: metres, radians, log scale.
-REACH = (0.02, 0.3, 0.15)
-# Least and greatest scale of a hypothesis along an axis.
-SCALES = (0.45, 2.0)
-# Share of the agreeing points that hold an unknown back which they do not determine.
-RIDGE = 0.02
+# Rows of the equations, and their columns: sum w J J^T, then sum w r J.
+UNKNOWNS = 9
+COLUMNS = UNKNOWNS + 1
+RIGHT_SIDE = UNKNOWNS
+# First unknown of each kind.
+ROTATION, LOG_SCALE = 3, 6
+# Longest step that the linearization is trusted for: metres, radians, log scale.
+MAX_STEP = (0.02, 0.3, 0.15)
+# Levenberg-Marquardt damping, relative to the diagonal.
+DAMPING = 1.02
+# Ridge: a step of MAX_STEP costs as much as a squared residual of RIDGE_M2 at this share of the
+# points. It holds back unknowns that the points do not determine.
+RIDGE, RIDGE_M2 = 0.02, 1e-4
+LEAST_PIVOT = 1e-12
+
+Triple = tuple[float, float, float]
 
 
 @nb.njit(cache=True, inline='always')
-def multiply(a, b, out):
-    """Write the quaternion product a * b (xyzw) into out (4,)."""
-    x = a[3] * b[0] + a[0] * b[3] + a[1] * b[2] - a[2] * b[1]
-    y = a[3] * b[1] - a[0] * b[2] + a[1] * b[3] + a[2] * b[0]
-    z = a[3] * b[2] + a[0] * b[1] - a[1] * b[0] + a[2] * b[3]
-    w = a[3] * b[3] - a[0] * b[0] - a[1] * b[1] - a[2] * b[2]
-    s = 1.0 / np.sqrt(x * x + y * y + z * z + w * w)
-    out[0], out[1], out[2], out[3] = x * s, y * s, z * s, w * s
-
-
-@nb.njit(cache=True, inline='always')
-def accumulate(A, h, R, x, y, z, nx, ny, nz, residual, weight):
+def add_equation(A: Float64Array, h: Float64Array, R: Float64Array,
+                 point: Triple, normal: Triple, residual: float, weight: float) -> None:
     """
-    Add a point's equation to A (9, 10): J^T J, and J^T r in the last column.
+    Add the equation of one point to A (9, 10).
 
-    :param h: the hypothesis, R its rotation; (x, y, z) the model point, world.
-    :param residual: metres along the measured normal (nx, ny, nz).
+    :param h: the hypothesis, `R` (3, 3) its rotation.
+    :param point: model point in the world, metres.
+    :param normal: measured normal; `residual` metres from the measured surface along it.
     """
-    nx, ny, nz = np.float64(nx), np.float64(ny), np.float64(nz)
-    px, py, pz = x - h[0], y - h[1], z - h[2]
+    x, y, z = point
+    nx, ny, nz = np.float64(normal[0]), np.float64(normal[1]), np.float64(normal[2])
+    px, py, pz = x - h[TX], y - h[TX + 1], z - h[TX + 2]
     j3, j4, j5 = py * nz - pz * ny, pz * nx - px * nz, px * ny - py * nx
     j6 = ((R[0, 0] * nx + R[1, 0] * ny + R[2, 0] * nz)
           * (R[0, 0] * px + R[1, 0] * py + R[2, 0] * pz))
@@ -48,106 +58,85 @@ def accumulate(A, h, R, x, y, z, nx, ny, nz, residual, weight):
           * (R[0, 1] * px + R[1, 1] * py + R[2, 1] * pz))
     j8 = ((R[0, 2] * nx + R[1, 2] * ny + R[2, 2] * nz)
           * (R[0, 2] * px + R[1, 2] * py + R[2, 2] * pz))
-    # Called for every pixel of every trial: loops over a tuple take four times as long.
-    _add(A, 0, weight * nx, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 1, weight * ny, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 2, weight * nz, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 3, weight * j3, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 4, weight * j4, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 5, weight * j5, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 6, weight * j6, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 7, weight * j7, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
-    _add(A, 8, weight * j8, nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    # Called for every pixel of every trial: a loop over the rows takes four times as long.
+    row = (nx, ny, nz, j3, j4, j5, j6, j7, j8, residual)
+    _add_row(A, 0, weight * nx, row)
+    _add_row(A, 1, weight * ny, row)
+    _add_row(A, 2, weight * nz, row)
+    _add_row(A, 3, weight * j3, row)
+    _add_row(A, 4, weight * j4, row)
+    _add_row(A, 5, weight * j5, row)
+    _add_row(A, 6, weight * j6, row)
+    _add_row(A, 7, weight * j7, row)
+    _add_row(A, 8, weight * j8, row)
 
 
 @nb.njit(cache=True, inline='always')
-def _add(A, row, w, a, b, c, d, e, f, g, i, j, k):
-    """Add w times ten numbers to a row of A."""
-    A[row, 0] += w * a
-    A[row, 1] += w * b
-    A[row, 2] += w * c
-    A[row, 3] += w * d
-    A[row, 4] += w * e
-    A[row, 5] += w * f
-    A[row, 6] += w * g
-    A[row, 7] += w * i
-    A[row, 8] += w * j
-    A[row, 9] += w * k
+def _add_row(A: Float64Array, k: int, factor: float, row: tuple[float, ...]) -> None:
+    """Add `factor` times a row of ten numbers to row k of A."""
+    A[k, 0] += factor * row[0]
+    A[k, 1] += factor * row[1]
+    A[k, 2] += factor * row[2]
+    A[k, 3] += factor * row[3]
+    A[k, 4] += factor * row[4]
+    A[k, 5] += factor * row[5]
+    A[k, 6] += factor * row[6]
+    A[k, 7] += factor * row[7]
+    A[k, 8] += factor * row[8]
+    A[k, 9] += factor * row[9]
 
 
 @nb.njit(cache=True)
-def pulled(A, n, h, prior, low, high, out):
+def gauss_newton_step(A: Float64Array, n: float, h: Float64Array, prior: float,
+                      scale_limits: tuple[float, float], out: Float64Array) -> None:
     """
-    Write the hypothesis one step along A from `h` into out (10,).
+    Write the hypothesis one step from `h` into out (10,).
 
-    :param n: sum of the weights in A; prior: cost of squared log scale, in units of a weight
-        times a squared metre.
-    :param low: least and `high` greatest scale.
+    The step is shortened as a whole to the longest that the linearization is trusted for.
+
+    :param A: (9, 10) float64 from add_equation.
+    :param n: sum of the weights in A.
+    :param prior: cost of the squared log scale, in units of a weight times a squared metre.
+    :param scale_limits: least and greatest scale of the result along an axis.
     """
-    L = np.zeros((9, 9))
-    b = np.empty(9)
-    for i in range(9):
-        b[i] = -A[i, 9]
-        hold = RIDGE * n * REACH[i // 3] ** -2 * 1e-4
+    L, step = _damped(A, n, h, prior)
+    cholesky_clamped(L, LEAST_PIVOT)
+    cholesky_solve(L, step)
+    _shorten(step)
+    low, high = scale_limits
+    out[:] = h[:WIDTH]
+    for i in range(3):
+        out[TX + i] += step[i]
+        out[SX + i] = min(high, max(low, h[SX + i] * np.exp(step[LOG_SCALE + i])))
+    q = np.array((step[ROTATION] / 2, step[ROTATION + 1] / 2, step[ROTATION + 2] / 2, 1.0))
+    quaternion_multiply(q, out[QX:QW + 1], out[QX:QW + 1])
+
+
+@nb.njit(cache=True)
+def _damped(A: Float64Array, n: float, h: Float64Array, prior: float,
+            ) -> tuple[Float64Array, Float64Array]:
+    """Return the lower triangle (9, 9) and the right side (9,) of the damped equations."""
+    L = np.zeros((UNKNOWNS, UNKNOWNS))
+    b = np.empty(UNKNOWNS)
+    for i in range(UNKNOWNS):
+        b[i] = -A[i, RIGHT_SIDE]
+        hold = RIDGE * n * MAX_STEP[i // 3] ** -2 * RIDGE_M2
         for j in range(i):
             L[i, j] = A[j, i]
-        L[i, i] = A[i, i] * 1.02 + hold
-        if i >= 6:
+        L[i, i] = A[i, i] * DAMPING + hold
+        if i >= LOG_SCALE:
             L[i, i] += prior
-            b[i] -= prior * np.log(h[1 + i])
-    # Cholesky in place, then both triangular solves.
-    for i in range(9):
-        for j in range(i + 1):
-            s = L[i, j]
-            for k in range(j):
-                s -= L[i, k] * L[j, k]
-            if i == j:
-                L[i, i] = np.sqrt(max(s, 1e-12))
-            else:
-                L[i, j] = s / L[j, j]
-    for i in range(9):
-        for k in range(i):
-            b[i] -= L[i, k] * b[k]
-        b[i] /= L[i, i]
-    for i in range(8, -1, -1):
-        for k in range(i + 1, 9):
-            b[i] -= L[k, i] * b[k]
-        b[i] /= L[i, i]
-    shrink = 1.0
-    for part in range(3):
-        length = np.sqrt(b[3 * part] ** 2 + b[3 * part + 1] ** 2 + b[3 * part + 2] ** 2)
-        if length * shrink > REACH[part]:
-            shrink = REACH[part] / length
-    for i in range(9):
-        b[i] *= shrink
-    out[:] = h[:10]
-    for i in range(3):
-        out[i] += b[i]
-        out[7 + i] = min(high, max(low, h[7 + i] * np.exp(b[6 + i])))
-    q = np.array((b[3] / 2, b[4] / 2, b[5] / 2, 1.0))
-    multiply(q, out[3:7], out[3:7])
+            b[i] -= prior * np.log(h[SX + i - LOG_SCALE])
+    return L, b
 
 
 @nb.njit(cache=True)
-def stepped(sigma_t, sigma_r, sigma_s, step, yaw, q, trial):
-    """
-    Move a hypothesis (10,) by a random step, in place: place, rotation, sizes or some of them.
-
-    :param sigma_t: metres, `sigma_r` radians, `sigma_s` log scale, all times `step`.
-    :param yaw: how much farther it turns about the vertical.
-    :param q: (4,) scratch.
-    """
-    part = np.random.random()
-    if part < 0.75:
-        for k in range(3):
-            trial[k] += np.random.normal() * sigma_t * step
-    if part > 0.4:
-        q[0] = np.random.normal() * sigma_r * step / 2
-        q[1] = np.random.normal() * sigma_r * step / 2
-        q[2] = np.random.normal() * sigma_r * step / 2 * yaw
-        q[3] = 1.0
-        multiply(q, trial[3:7], trial[3:7])
-    if part > 0.6 or part < 0.2:
-        for k in range(3):
-            trial[7 + k] = min(SCALES[1], max(SCALES[0], trial[7 + k] * np.exp(
-                np.random.normal() * sigma_s * step)))
+def _shorten(step: Float64Array) -> None:
+    """Scale a step (9,) down, in place, so that no part of it exceeds MAX_STEP."""
+    shrink = 1.0
+    for part in range(3):
+        length = np.sqrt(step[3 * part] ** 2 + step[3 * part + 1] ** 2 + step[3 * part + 2] ** 2)
+        if length * shrink > MAX_STEP[part]:
+            shrink = MAX_STEP[part] / length
+    for i in range(UNKNOWNS):
+        step[i] *= shrink

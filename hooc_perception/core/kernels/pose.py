@@ -22,6 +22,9 @@ SCORE = WIDTH
 TRANSLATION, QUATERNION, SCALE = slice(0, 3), slice(3, 7), slice(7, 10)
 # Least and greatest scale of a hypothesis along an axis.
 SCALE_LIMITS = (0.45, 2.0)
+# Length of random steps, in step sizes: its limits, and the factor after a success.
+LENGTH_LIMITS = (0.05, 2.0)
+LENGTHEN = 1.3
 
 
 class StepSizes(NamedTuple):
@@ -100,3 +103,11 @@ def random_step(sizes: StepSizes, length: float, yaw: float, q: Float64Array,
         for k in range(3):
             factor = np.exp(np.random.normal() * sizes.log_scale * length)
             trial[SX + k] = min(SCALE_LIMITS[1], max(SCALE_LIMITS[0], trial[SX + k] * factor))
+
+
+@nb.njit(cache=True, inline='always')
+def adapted_length(length: float, success: bool, shorten: float) -> float:
+    """Return the length of the next random step; `shorten` is the factor after a failure."""
+    if success:
+        return min(LENGTH_LIMITS[1], length * LENGTHEN)
+    return max(LENGTH_LIMITS[0], length * shorten)

@@ -1,15 +1,25 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Z-buffer rasterisation of triangle meshes: nearest surface wins, both sides are drawn."""
+"""Z-buffer rasterization of triangle meshes: the nearest surface wins, both sides are drawn."""
 
+from hooc_perception.core.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 import numba as nb
 import numpy as np
 
+# Triangles with a vertex nearer to the camera's centre than this are left out.
 NEAR_M = 0.05
+# Rows wider than this many pixels are cut to the span of the triangle before they are walked.
+NARROW_PX = 3
+# Spans are this much too wide, so that rounding never cuts off a covered pixel.
+SLACK_PX = 0.01
+
+Triple = tuple[float, float, float]
 
 
 @nb.njit(cache=True)
-def project_vertices(vertices_world, R_camera_world, t_camera_world, fx, fy, cx, cy):
+def project_vertices(vertices_world: Float64Array, R_camera_world: Float64Array,
+                     t_camera_world: Float64Array, fx: float, fy: float, cx: float,
+                     cy: float) -> Float64Array:
     """Return (V, 3) float64 rows (u, v, z): pixel coordinates and depth in metres."""
     out = np.empty((vertices_world.shape[0], 3))
     for i in range(vertices_world.shape[0]):
@@ -26,22 +36,40 @@ def project_vertices(vertices_world, R_camera_world, t_camera_world, fx, fy, cx,
 
 
 @nb.njit(cache=True, inline='always')
-def _clip(low, high, at_zero, slope, inverse):
+def _clip(low: float, high: float, at_zero: float, slope: float,
+          inverse: float) -> tuple[float, float]:
     """Return the part of [low, high] where at_zero + slope * x >= 0, a little too wide."""
     if slope > 1e-6:
-        return max(low, -at_zero * inverse - 0.01), high
+        return max(low, -at_zero * inverse - SLACK_PX), high
     if slope < -1e-6:
-        return low, min(high, -at_zero * inverse + 0.01)
+        return low, min(high, -at_zero * inverse + SLACK_PX)
     return low, high
 
 
+@nb.njit(cache=True, inline='always')
+def _span(x_lo: int, x_hi: int, at_zero: Triple, slope: Triple,
+          inverse: Triple) -> tuple[float, float]:
+    """Return the part of a row where all three edge functions at_zero + slope * x are >= 0."""
+    left, right = _clip(float(x_lo), float(x_hi), at_zero[0], slope[0], inverse[0])
+    left, right = _clip(left, right, at_zero[1], slope[1], inverse[1])
+    return _clip(left, right, at_zero[2], slope[2], inverse[2])
+
+
+@nb.njit(cache=True, inline='always')
+def _range(a: float, b: float, c: float, n: int) -> tuple[int, int]:
+    """Return the first and the last of n pixels whose centres three coordinates enclose."""
+    return max(0, int(np.ceil(min(a, b, c)))), min(n - 1, int(np.floor(max(a, b, c))))
+
+
 @nb.njit(cache=True, error_model='numpy')
-def draw(uvz, faces, label, u0, v0, depth, labels, closed=False):
+def draw(uvz: Float64Array, faces: Int32Array, label: int, u0: int, v0: int, depth: Float32Array,
+         labels: Int32Array, closed: bool = False) -> None:
     """
     Draw a projected mesh into a window whose first pixel is (u0, v0).
 
     Triangles with a vertex nearer than NEAR_M are left out. A pixel is covered when its centre
-    lies inside or on the border; depth is interpolated linearly in 1 / z.
+    lies inside or on the border, which the signs of the three edge functions wa, wb, wc tell;
+    depth is interpolated linearly in 1 / z.
 
     :param uvz: (V, 3) float64 from project_vertices.
     :param depth: (h, w) float32, read and written; start with inf.
@@ -62,30 +90,24 @@ def draw(uvz, faces, label, u0, v0, depth, labels, closed=False):
         area = (bx - ax) * (cy - ay) - (by - ay) * (cx - ax)
         if area == 0.0 or (closed and area > 0.0):
             continue
-        x_lo = max(0, int(np.ceil(min(ax, bx, cx))))
-        x_hi = min(w - 1, int(np.floor(max(ax, bx, cx))))
-        y_lo = max(0, int(np.ceil(min(ay, by, cy))))
-        y_hi = min(h - 1, int(np.floor(max(ay, by, cy))))
+        x_lo, x_hi = _range(ax, bx, cx, w)
+        y_lo, y_hi = _range(ay, by, cy, h)
         if x_lo > x_hi or y_lo > y_hi:
             continue
         ia, ib, ic = 1.0 / (za * area), 1.0 / (zb * area), 1.0 / (zc * area)
         sign = 1.0 if area > 0 else -1.0
-        # What a step along x adds to wa, wb and wc below, towards the inside.
+        # What a step along x adds to wa, wb and wc, towards the inside.
         da, db = (by - cy) * sign, (cy - ay) * sign
-        dc = -(da + db)
+        slope = da, db, -(da + db)
         # Long thin triangles fill little of their window: only the span of a row is walked.
-        wide = x_hi - x_lo > 3
-        ra, rb, rc = 0.0, 0.0, 0.0
-        if wide:
-            ra, rb, rc = 1.0 / da, 1.0 / db, 1.0 / dc
+        wide = x_hi - x_lo > NARROW_PX
+        inverse = (1.0 / slope[0], 1.0 / slope[1], 1.0 / slope[2]) if wide else (0.0, 0.0, 0.0)
         for y in range(y_lo, y_hi + 1):
             low, high = x_lo, x_hi
             if wide:
                 wa = (bx * (cy - y) - (by - y) * cx) * sign
                 wb = (cx * (ay - y) - (cy - y) * ax) * sign
-                left, right = _clip(float(x_lo), float(x_hi), wa, da, ra)
-                left, right = _clip(left, right, wb, db, rb)
-                left, right = _clip(left, right, area * sign - wa - wb, dc, rc)
+                left, right = _span(x_lo, x_hi, (wa, wb, area * sign - wa - wb), slope, inverse)
                 if left > right:
                     continue
                 low, high = int(np.ceil(left)), int(np.floor(right))
@@ -102,7 +124,9 @@ def draw(uvz, faces, label, u0, v0, depth, labels, closed=False):
 
 
 @nb.njit(cache=True)
-def in_view(vertices_world, R_camera_world, t_camera_world, K, size):
+def in_view(vertices_world: Float64Array, R_camera_world: Float64Array,
+            t_camera_world: Float64Array, K: Float64Array, size: Int64Array,
+            ) -> tuple[Float64Array, tuple[int, int, int, int]]:
     """Return (projected vertices, their window) in a view of `size` (2,) width and height."""
     uvz = project_vertices(vertices_world, R_camera_world, t_camera_world, K[0, 0], K[1, 1],
                            K[0, 2], K[1, 2])
@@ -110,7 +134,7 @@ def in_view(vertices_world, R_camera_world, t_camera_world, K, size):
 
 
 @nb.njit(cache=True)
-def bounding_window(uvz, width, height):
+def bounding_window(uvz: Float64Array, width: int, height: int) -> tuple[int, int, int, int]:
     """Return (u0, v0, u1, v1), the half-open pixel window of a projected mesh, clipped."""
     u_lo, v_lo, u_hi, v_hi = 1e9, 1e9, -1e9, -1e9
     for i in range(uvz.shape[0]):

@@ -55,9 +55,9 @@ def parsed_scene(frame: Frame, choice: Choice, costs: PixelCosts) -> ParsedScene
                            choice.converged)
     evidence, weights = frame.evidence, costs.weights()
     H = hypotheses_of(objects, frame.models)
-    _, lists = evidence.explain(H, objects.category, weights, lists=True)
+    _, lists = evidence.compare_pixels(H, objects.category, weights)
     context = evidence.compose(np.arange(n), lists)
-    stats = evidence.explain(H, objects.category, weights, context, me=np.arange(n))
+    stats = evidence.compare(H, objects.category, weights, context, np.arange(n))
     alone = np.maximum(stats[:, stat.SHOWN], 1)
     seen = alone - stats[:, stat.BEHIND]
     agree = stats[:, stat.AGREE]

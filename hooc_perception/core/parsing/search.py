@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.energy.joint import JointEnergy
 from hooc_perception.core.energy.local_search import local_search, SearchResult
-from hooc_perception.core.frame.evidence import Context, Evidence, hypotheses_of
+from hooc_perception.core.frame.evidence import Evidence, hypotheses_of
 from hooc_perception.core.frame.frame import Frame
+from hooc_perception.core.frame.kernels.records import Context, RefineSettings
 from hooc_perception.core.hypotheses.merge import merged_pairs
 from hooc_perception.core.hypotheses.propose import candidates_of
 from hooc_perception.core.parsing.config import ParseConfig
@@ -75,9 +76,8 @@ class Search:
         self.evidence, self.models, self.config = evidence, models, config
         self.max_instances = max_instances
         self.pool, self.mask = Candidates.empty(), np.zeros(0, bool)
-        self.stats, self.lists = evidence.explain(
-            hypotheses_of(self.pool, models), self.pool.category, config.pixels.weights(),
-            lists=True)
+        self.stats, self.lists = evidence.compare_pixels(
+            hypotheses_of(self.pool, models), self.pool.category, config.pixels.weights())
         self._penalty: Float64Array | None = None
         self._energy: JointEnergy | None = None
 
@@ -97,8 +97,8 @@ class Search:
         """Add Candidates to the pool; none of them is chosen yet."""
         if not len(new):
             return
-        stats, lists = self.evidence.explain(hypotheses_of(new, self.models), new.category,
-                                             self.config.pixels.weights(), lists=True)
+        stats, lists = self.evidence.compare_pixels(
+            hypotheses_of(new, self.models), new.category, self.config.pixels.weights())
         first = not len(self.pool)
         self.stats = stats if first else np.concatenate([self.stats, stats])
         self.lists = lists if first else self.lists.extended(lists)
@@ -190,11 +190,11 @@ class Search:
 
     def _refined(self, start: Candidates, own: Sequence[int] | np.ndarray, context: Context,
                  steps: int, rng: np.random.Generator) -> Candidates:
-        """Return `start`, each row refined in its context; see Evidence.polish."""
-        H = self.evidence.polish(
-            hypotheses_of(start, self.models), start.category, own, context,
-            self.config.pixels.weights(), self.config.objects.complexity,
-            self.config.objects.size_prior, steps, STEPS, rng)
+        """Return `start`, each row refined in its context; see Evidence.refine."""
+        costs = self.config.objects
+        H = self.evidence.refine(
+            hypotheses_of(start, self.models), start.category, self.config.pixels.weights(),
+            RefineSettings(costs.complexity, costs.size_prior, steps, *STEPS), rng, context, own)
         return candidates_of(H, start.category, start.score, self.models)
 
     def _build_energy(self) -> JointEnergy:

@@ -18,6 +18,7 @@ from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
 from hooc_perception.core.frame.evidence import Evidence, hypotheses_of
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.frame.kernels import compare as stat
+from hooc_perception.core.frame.kernels.records import RefineSettings
 from hooc_perception.core.parsing.search import STEPS
 from hooc_perception.core.symmetry import half_turns, is_ball
 from hooc_perception.core.types import Candidates, GenericModel, ParsedScene
@@ -98,12 +99,12 @@ class _Cost:
         self.weights = pixels.weights()
         self.H = hypotheses_of(objects, models)
         self.category = objects.category.astype(np.int64)
-        _, lists = evidence.explain(self.H, self.category, self.weights, lists=True)
+        _, lists = evidence.compare_pixels(self.H, self.category, self.weights)
         self.context = evidence.compose(np.arange(len(objects)), lists)
 
     def of(self, H: Float64Array, own: Int64Array) -> tuple[Float64Array, Float64Array]:
         """Return (m,) costs in pixels of the full images, and (m,) pixels that are shown."""
-        stats = self.evidence.explain(H, self.category[own], self.weights, self.context, me=own)
+        stats = self.evidence.compare(H, self.category[own], self.weights, self.context, own)
         prior = self.costs.size_prior * (np.log(H[:, 7:10]) ** 2).sum(1)
         shown = stats[:, stat.SHOWN] / self.evidence.scale
         return (stats[:, stat.DELTA] / self.evidence.scale
@@ -112,8 +113,10 @@ class _Cost:
     def refined(self, H: Float64Array, own: Int64Array, rng: np.random.Generator) -> Float64Array:
         """Return hypotheses refined for some steps, each in place of its object."""
         c = self.costs
-        return self.evidence.polish(H, self.category[own], own, self.context, self.weights,
-                                    c.complexity, c.size_prior, POLISH_STEPS, STEPS, rng)
+        return self.evidence.refine(
+            H, self.category[own], self.weights,
+            RefineSettings(c.complexity, c.size_prior, POLISH_STEPS, *STEPS), rng, self.context,
+            own)
 
 
 def _wider(p_flip: float) -> float:
@@ -138,14 +141,14 @@ def _information(cost: _Cost, longest: Float64Array) -> Float64Array:
     H[:, 3:7] = (Rotation.from_rotvec(flat[:, 3:6] / half)
                  * Rotation.from_quat(H[:, 3:7])).as_quat()
     H[:, 7:10] *= np.exp(flat[:, 6:9] / half)
-    _, lists = evidence.explain(H, cost.category[own], cost.weights, cost.context, True, own)
-    residual = np.clip((lists.depth - evidence.depth[lists.pixel]) / tolerance, -1, 1)
+    _, lists = evidence.compare_pixels(H, cost.category[own], cost.weights, cost.context, own)
+    residual = np.clip((lists.depth - evidence.views.depth[lists.pixel]) / tolerance, -1, 1)
     out = np.zeros((n, 9, 9))
     for k in range(n):
         first, last = lists.offsets[18 * k], lists.offsets[18 * (k + 1)]
         pixels, at = np.unique(lists.pixel[first:last], return_inverse=True)
         # Without the object the table is seen: too far for foreground, right for all else.
-        r = np.tile(evidence.foreground[pixels].astype(float), (18, 1))
+        r = np.tile(evidence.views.foreground[pixels].astype(float), (18, 1))
         move = np.repeat(np.arange(18), np.diff(lists.offsets[18 * k:18 * (k + 1) + 1]))
         r[move, at] = residual[first:last]
         J = (r[:9] - r[9:]) / (2 * STEP_M)

@@ -20,9 +20,9 @@ from hooc_perception.core.arrays import (
 )
 from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.energy.joint import JointEnergy
-from hooc_perception.core.frame.evidence import Evidence, PixelLists
+from hooc_perception.core.frame.evidence import Evidence
 from hooc_perception.core.frame.kernels import compare as kernel
-from hooc_perception.core.frame.kernels.pixel_lists import opinions
+from hooc_perception.core.frame.kernels.pixel_lists import mean_probabilities, PixelLists
 from hooc_perception.core.parsing.search import Search
 from hooc_perception.core.types import Candidates, GenericModel
 from hooc_perception.errors import HoocError
@@ -149,8 +149,7 @@ def _category_margin(margin: Float64Array, category: UInt16Array) -> Float64Arra
 def _opinions(evidence: Evidence, lists: PixelLists, n: int,
               ) -> tuple[Float64Array, Float64Array]:
     """Return ((n, N + 1) mean class probabilities, (n,) share of foreground) of the pixels."""
-    p, front = np.zeros((n, evidence.p.shape[1])), np.zeros(n)
-    opinions(lists.offsets, lists.pixel, evidence.p_row, evidence.p, evidence.foreground, p,
-             front)
+    p, front = np.zeros((n, evidence.views.p.shape[1])), np.zeros(n)
+    mean_probabilities(lists, evidence.views, p, front)
     covered = np.maximum(np.diff(lists.offsets), 1)
     return p, front / covered

@@ -19,8 +19,8 @@ CONFIG = ObjectCosts()
 def energy_of_pool(desk, pool, config=CONFIG, max_instances=0):
     """Return (JointEnergy over all pixels, stats, lists, evidence)."""
     evidence = desk.frame.evidence
-    stats, lists = evidence.explain(hypotheses_of(pool, desk.models), pool.category,
-                                    PixelCosts().weights(), lists=True)
+    stats, lists = evidence.compare_pixels(hypotheses_of(pool, desk.models), pool.category,
+                                           PixelCosts().weights())
     return (JointEnergy(evidence, pool, stats, lists, desk.models, config, max_instances), stats,
             lists, evidence)
 
@@ -39,7 +39,7 @@ def setting(desk, desk_pool):
 
 def dense(setting, mask, models, config=CONFIG):
     """Return the energy of a subset, pixel by pixel and object by object."""
-    depth = np.full(len(setting.evidence.depth), np.inf)
+    depth = np.full(len(setting.evidence.views.depth), np.inf)
     cost = setting.evidence.cost_none.astype(float)
     total = 0.0
     for k in np.flatnonzero(mask):

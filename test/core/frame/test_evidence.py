@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The layout of the evidence: strides, pixel lists, hypotheses and what is left."""
 
-from hooc_perception.core.frame.evidence import hypotheses_of, PixelLists, PixelWeights
+from hooc_perception.core.frame.evidence import hypotheses_of
 from hooc_perception.core.frame.kernels import compare as stat
+from hooc_perception.core.frame.kernels.pixel_lists import PixelLists
+from hooc_perception.core.frame.kernels.records import PixelWeights
 from hooc_perception.core.hypotheses.propose import candidates_of
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Candidates
@@ -20,11 +22,11 @@ def space(desk):
 
 
 def test_views_are_laid_out_one_after_the_other(desk, space):
-    e = space.evidence
-    views = desk.observation.views
+    evidence, views = space.evidence, desk.observation.views
+    e = evidence.views
     np.testing.assert_array_equal(e.depth, np.concatenate([v.depth.ravel() for v in views]))
     np.testing.assert_array_equal(e.first, np.cumsum([0] + [v.depth.size for v in views]))
-    np.testing.assert_array_equal(e.cost_none, np.concatenate(
+    np.testing.assert_array_equal(evidence.cost_none, np.concatenate(
         [v.foreground.ravel() for v in views]))
     np.testing.assert_array_equal(np.bincount(e.patch[e.patch >= 0]), e.patch_size)
     i = np.flatnonzero(e.p_row >= 0)
@@ -35,15 +37,16 @@ def test_views_are_laid_out_one_after_the_other(desk, space):
 
 def test_a_stride_looks_at_every_second_pixel_of_the_same_picture(desk, space):
     H, category = hypotheses_of(desk.truth, desk.models), desk.truth.category
-    _, full = space.evidence.explain(H, category, WEIGHTS, lists=True)
-    stats, half = space.coarse.explain(H, category, WEIGHTS, lists=True)
+    _, full = space.evidence.compare_pixels(H, category, WEIGHTS)
+    stats, half = space.coarse.compare_pixels(H, category, WEIGHTS)
     for k in range(len(H)):
-        shown = np.full(len(space.evidence.depth), np.inf, np.float32)
+        shown = np.full(len(space.evidence.views.depth), np.inf, np.float32)
         mine = slice(*full.offsets[k:k + 2])
         shown[full.pixel[mine]] = full.depth[mine]
         every_second = np.concatenate(
             [shown[a:b].reshape(v.depth.shape)[::2, ::2].ravel() for a, b, v in
-             zip(space.evidence.first, space.evidence.first[1:], desk.observation.views)])
+             zip(space.evidence.views.first, space.evidence.views.first[1:],
+                 desk.observation.views)])
         mine = slice(*half.offsets[k:k + 2])
         np.testing.assert_array_equal(half.pixel[mine], np.flatnonzero(np.isfinite(every_second)))
         np.testing.assert_allclose(half.depth[mine], every_second[half.pixel[mine]], rtol=1e-6)
@@ -52,13 +55,13 @@ def test_a_stride_looks_at_every_second_pixel_of_the_same_picture(desk, space):
 
 def test_composed_pictures_are_those_of_the_renderer(desk, space):
     H = hypotheses_of(desk.truth, desk.models)
-    _, lists = space.evidence.explain(H, desk.truth.category, WEIGHTS, lists=True)
+    _, lists = space.evidence.compare_pixels(H, desk.truth.category, WEIGHTS)
     owner, depth, *_ = space.evidence.compose([0, 1, 2], lists)
     drawn = [render_depth(desk.meshes, v.camera) for v in desk.observation.views]
     expected = np.concatenate([d.ravel() for d, _ in drawn])
     ids = np.concatenate([i.ravel() for _, i in drawn])
     # The lists leave out pixels without a reading.
-    read = np.isfinite(space.evidence.depth)
+    read = np.isfinite(space.evidence.views.depth)
     np.testing.assert_array_equal(np.isfinite(depth)[read], np.isfinite(expected)[read])
     both = read & np.isfinite(expected)
     np.testing.assert_allclose(depth[both], expected[both], rtol=1e-6)
@@ -97,7 +100,7 @@ def test_hypotheses_and_candidates_are_the_same_things(desk):
 
 def test_what_an_object_covers_is_no_longer_unexplained(desk, space):
     H = hypotheses_of(desk.truth, desk.models)
-    _, lists = space.evidence.explain(H, desk.truth.category, WEIGHTS, lists=True)
+    _, lists = space.evidence.compare_pixels(H, desk.truth.category, WEIGHTS)
     alone = space.evidence.unexplained()
     np.testing.assert_array_equal(alone, 1)
     left = space.evidence.unexplained(space.evidence.compose([0, 2], lists))
@@ -108,6 +111,6 @@ def test_what_an_object_covers_is_no_longer_unexplained(desk, space):
 
 
 def test_nothing_is_asked_of_no_hypothesis(space):
-    stats, lists = space.evidence.explain(np.zeros((0, 10)), np.zeros(0, int), WEIGHTS, lists=True)
+    stats, lists = space.evidence.compare_pixels(np.zeros((0, 10)), np.zeros(0, int), WEIGHTS)
     assert stats.shape == (0, stat.STATS)
     assert lists.offsets.tolist() == [0]

@@ -9,7 +9,6 @@ from hooc_perception.core.types import PixelProbabilities
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
-from scipy.spatial.transform import Rotation
 
 
 @pytest.fixture(scope='module')
@@ -75,24 +74,6 @@ def test_too_few_neighbours_give_no_normal():
                                np.tile([0, 0, 1.0], (10, 1)), atol=1e-6)
     # The gate is a distance in space: with all but one neighbour out of reach, there is none.
     assert np.isnan(kernel.normals_of_view(points, valid, eye, 3, 0.005)).all()
-
-
-@pytest.mark.parametrize('eigenvalues', [(1e-6, 2e-5, 3e-5), (0.0, 1e-5, 1e-5), (1e-7, 1e-6, 1.0),
-                                         (1.0, 2.0, 4.0)])
-def test_smallest_eigenvector(eigenvalues):
-    rng = np.random.default_rng(1)
-    for _ in range(20):
-        R = Rotation.random(rng=rng).as_matrix()
-        C = R @ np.diag(eigenvalues) @ R.T
-        C = (C + C.T) / 2
-        vector = kernel._smallest_eigenvector(C)
-        assert np.linalg.norm(vector) == pytest.approx(1)
-        assert abs(vector @ R[:, 0]) > 1 - 1e-6
-
-
-def test_smallest_eigenvector_of_a_ball_and_of_nothing_is_some_unit_vector():
-    for C in (np.eye(3), np.zeros((3, 3))):
-        assert np.linalg.norm(kernel._smallest_eigenvector(C)) == pytest.approx(1)
 
 
 def test_points_of_the_cloud_are_means_of_their_pixels(desk, cloud):

@@ -38,4 +38,4 @@ def test_nothing_outlives_it(desk):
 def test_an_empty_table_has_no_field(empty_desk):
     assert empty_desk.frame.field is None
     assert len(empty_desk.frame.patch) == 0
-    assert not empty_desk.frame.evidence.foreground.any()
+    assert not empty_desk.frame.evidence.views.foreground.any()

@@ -4,8 +4,15 @@
 
 from types import SimpleNamespace
 
-from hooc_perception.core.hypotheses.kernels import hypotheses as kernel
+from hooc_perception.core.hypotheses.kernels import drawing, refinement, scoring
+from hooc_perception.core.hypotheses.kernels.records import (
+    DrawSettings,
+    FieldRefineSettings,
+    ScoreWeights,
+    Surface,
+)
 from hooc_perception.core.hypotheses.sampling import tables
+from hooc_perception.core.kernels.pose import rotation_of
 import numba
 import numpy as np
 import pytest
@@ -13,7 +20,8 @@ from scipy.spatial.transform import Rotation
 
 FREE, SHELL, PRIOR = 0.7, 0.6, 0.03
 POINTS = 64
-NO_PULL = np.empty((0, 0))
+NO_EQUATIONS = np.empty((0, 0))
+WEIGHTS = ScoreWeights(FREE, SHELL, PRIOR)
 
 
 @pytest.fixture(scope='module')
@@ -39,11 +47,15 @@ def seed_kernels(seed):
     np.random.seed(seed)  # noqa: NPY002
 
 
+def surface_of(ground, c):
+    """Return the Surface of model c."""
+    return Surface(ground.t.points[c], ground.t.normals[c])
+
+
 def value(ground, h, c, n=POINTS):
     """Return the kernel's score of hypothesis `h` of model c."""
-    return kernel.value(h, ground.t.points[c], ground.t.normals[c], n, ground.field.data,
-                        ground.field.origin, ground.field.voxel, FREE, SHELL, PRIOR,
-                        np.empty((3, 3)), NO_PULL)
+    return scoring.score(h, surface_of(ground, c), n, ground.field, WEIGHTS, np.empty((3, 3)),
+                         NO_EQUATIONS)
 
 
 def posed(ground, h, c, n=POINTS):
@@ -78,35 +90,17 @@ def plain_evidence(ground, h, c):
         if distance < 255:
             facing = normal @ (np.array(coded) - 128) / 127
             agree += (1 - (distance / 255) ** 2) * np.clip(facing, 0, 1)
-        at = voxel_of(ground, point + kernel.SHELL_M * normal)
+        at = voxel_of(ground, point + scoring.SHELL_M * normal)
         if at is not None:
             shell += max(0.0, 1 - float(ground.field.data[at][0]) / 90)
     return agree, violate, shell
 
 
-def test_rotations_and_products_are_scipys():
-    rng = np.random.default_rng(0)
-    for _ in range(20):
-        a, b = Rotation.random(2, rng=rng)
-        h, R, out = np.zeros(10), np.empty((3, 3)), np.empty(4)
-        h[3:7] = a.as_quat()
-        kernel.rotation_of(h, R)
-        np.testing.assert_allclose(R, a.as_matrix(), atol=1e-12)
-        kernel.multiply(3.0 * a.as_quat(), b.as_quat(), out)
-        np.testing.assert_allclose(Rotation.from_quat(out).as_matrix(), (a * b).as_matrix(),
-                                   atol=1e-12)
-        assert np.linalg.norm(out) == pytest.approx(1)
-        kernel.multiply(a.as_quat(), h[3:7], h[3:7])
-        np.testing.assert_allclose(Rotation.from_quat(h[3:7]).as_matrix(), (a * a).as_matrix(),
-                                   atol=1e-12)
-
-
 def test_evidence_is_that_of_plain_numpy(ground):
     seen = []
     for h, c in zip(ground.H, ground.model_of):
-        found = kernel.evidence(h, ground.t.points[c], ground.t.normals[c], 0, POINTS,
-                                ground.field.data, ground.field.origin, ground.field.voxel,
-                                np.empty((3, 3)), NO_PULL)
+        found = scoring.field_evidence(h, surface_of(ground, c), 0, POINTS, ground.field,
+                                       np.empty((3, 3)), NO_EQUATIONS)
         np.testing.assert_allclose(found, plain_evidence(ground, h, c), atol=1e-6)
         seen.append(found)
     assert (np.ptp(seen, axis=0) > 5).all(), 'the hypotheses are too much alike'
@@ -116,9 +110,8 @@ def test_evidence_adds_up_over_the_points(ground):
     h, c = ground.H[20], ground.model_of[20]
 
     def part(first, last):
-        return np.array(kernel.evidence(
-            h, ground.t.points[c], ground.t.normals[c], first, last, ground.field.data,
-            ground.field.origin, ground.field.voxel, np.empty((3, 3)), NO_PULL))
+        return np.array(scoring.field_evidence(h, surface_of(ground, c), first, last,
+                                               ground.field, np.empty((3, 3)), NO_EQUATIONS))
 
     np.testing.assert_allclose(part(0, 40) + part(40, 64), part(0, 64))
 
@@ -149,7 +142,7 @@ def test_the_true_pose_scores_above_what_is_clearly_wrong(ground):
 
 def test_quick_field_and_its_sum(ground):
     data = ground.field.data
-    coarse = kernel.quick_field(data)
+    coarse = scoring.quick_field(data)
     distance, free = data[..., 0] / 255.0, data[..., 1] / 255.0
     expected = np.where(data[..., 0] < 255, 100 * (1 - distance ** 2), -100 * free)
     assert coarse.dtype == np.int8
@@ -158,8 +151,8 @@ def test_quick_field_and_its_sum(ground):
         at = [voxel_of(ground, p) for p in posed(ground, h, c, 16)[0]]
         outside = [v for v in at if v is None]
         total = sum(float(coarse[v]) for v in at if v is not None)
-        found = kernel.quick(h, ground.t.points[c], 16, coarse, ground.field.origin,
-                             ground.field.voxel, np.empty((3, 3)))
+        found = scoring.quick_score(h, ground.t.points[c], 16, coarse, ground.field,
+                                    np.empty((3, 3)))
         assert found <= total
         assert bool(outside) == (found < total)
 
@@ -167,9 +160,8 @@ def test_quick_field_and_its_sum(ground):
 def climbed(ground, H, seeds, steps):
     """Return hypotheses (m, 11) after `refine_all`."""
     rows = np.column_stack([H, np.zeros(len(H))])
-    kernel.refine_all(seeds, rows, ground.model_of, ground.t.points, ground.t.normals, POINTS,
-                      ground.field.data, ground.field.origin, ground.field.voxel, FREE, SHELL,
-                      PRIOR, steps, 0.01, 0.12, 0.08)
+    refinement.refine_all(seeds, rows, ground.model_of, ground.t, ground.field, WEIGHTS,
+                          FieldRefineSettings(POINTS, steps, 0.01, 0.12, 0.08))
     return rows
 
 
@@ -204,6 +196,11 @@ def test_one_seed_one_result_whatever_the_threads(ground):
     assert (climbed(ground, ground.H, seeds + 1, 15) != results[0]).any()
 
 
+def drawn_with(size_sigma, tilted):
+    """Return DrawSettings of one draw."""
+    return DrawSettings(1, 1, size_sigma, tilted, 1, 1)
+
+
 AXES = {name: np.array(v, float) for name, v in (
     ('x', [1, 0, 0]), ('y', [0, 1, 0]), ('z', [0, 0, 1]), ('-x', [-1, 0, 0]), ('-z', [0, 0, -1]),
     ('slanted', [0.6, 0, 0.8]))}
@@ -218,9 +215,10 @@ def test_a_drawn_pose_puts_the_point_on_the_scene_with_the_same_facing(model, sc
     spins = set()
     seed_kernels(0)
     for _ in range(10):
-        kernel._draw_pose(h, point, normal, np.array([[0, 0, 0, 1.0]]), np.ones(1), at,
-                          scene_normal, 0, 0.0, 1.0, q)
-        kernel.rotation_of(h, R)
+        drawing.draw_pose(
+            h, drawing.Model(point, normal, np.array([[0, 0, 0, 1.0]]), np.ones(1)),
+            Surface(at, scene_normal), 0, drawn_with(size_sigma=0.0, tilted=1.0), q)
+        rotation_of(h, R)
         np.testing.assert_allclose(R @ (point[0] * h[7:10]) + h[:3], at[0], atol=1e-9)
         np.testing.assert_allclose(R @ normal[0], scene_normal[0], atol=1e-9)
         spins.add(tuple(h[3:7].round(6)))
@@ -233,8 +231,9 @@ def test_resting_draws_stay_near_their_resting_pose():
     h, q, lean = np.empty(10), np.empty(4), []
     seed_kernels(1)
     for _ in range(200):
-        kernel._draw_pose(h, point, up, rest, np.array([0.5, 1.0]), np.zeros((1, 3)), up, 0, 0.2,
-                          0.0, q)
+        drawing.draw_pose(h, drawing.Model(point, up, rest, np.array([0.5, 1.0])),
+                          Surface(np.zeros((1, 3)), up), 0,
+                          drawn_with(size_sigma=0.2, tilted=0.0), q)
         lean.append(np.arccos(Rotation.from_quat(h[3:7]).as_matrix()[2, 2]))
         assert 0.5 <= h[7:10].min() <= h[7:10].max() <= 1.8
     # About half stand, about half lie.

@@ -54,8 +54,8 @@ def test_margins_are_what_one_exchange_leaves_to_gain(desk):
     pool = desk.truth.extended(desk.truth)
     pool.translation[3:] += [0.015, 0.0, 0.0]
     evidence = desk.frame.coarse
-    stats, lists = evidence.explain(hypotheses_of(pool, desk.models), pool.category,
-                                    PixelCosts().weights(), lists=True)
+    stats, lists = evidence.compare_pixels(hypotheses_of(pool, desk.models), pool.category,
+                                           PixelCosts().weights())
     energy = JointEnergy(evidence, pool, stats, lists, desk.models, ObjectCosts(), 1)
     start = np.array([True, True, False, False, False, False])
     energy.reset(start)

@@ -1,260 +1,286 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Render hypotheses into all views at once and hold them against what was measured."""
+"""
+Render hypotheses into all views and compare them with what was measured there.
 
-from hooc_perception.core.hypotheses.kernels.hypotheses import rotation_of
+A hypothesis is compared by itself, in the context of what is shown already: every pixel that it
+covers is compared with the reading there (pixel_cost.py), and its statistics say by how much it
+would change the sum of all pixels' costs (DELTA), and why.
+"""
+
+from typing import NamedTuple
+
+from hooc_perception.core.arrays import Float32Array, Float64Array, Int32Array, Int64Array
+from hooc_perception.core.frame.kernels.pixel_cost import (
+    AGREES,
+    pixel_cost,
+    SEEN_THROUGH,
+    shown_without,
+    unlikeliness,
+)
+from hooc_perception.core.frame.kernels.records import (
+    Context,
+    Hypotheses,
+    Meshes,
+    PixelOutput,
+    PixelWeights,
+    Target,
+    Views,
+)
 from hooc_perception.core.kernels import raster
-from hooc_perception.core.kernels.gauss_newton import accumulate, pulled, SCALES, stepped
+from hooc_perception.core.kernels.gauss_newton import add_equation
+from hooc_perception.core.kernels.pose import posed, rotation_of
 import numba as nb
 import numpy as np
 
 # Columns of the statistics of one hypothesis.
-(SHOWN, AGREE, GAIN, VIOLATE, BEHIND, MISSING, SHARE, UNLIKELINESS, COS, RESIDUAL, DELTA,
- VIEWS) = range(12)
+SHOWN = 0           # pixels that it covers
+AGREE = 1           # pixels whose reading agrees
+GAIN = 2            # sum over the agreeing pixels of 1 - cost
+VIOLATE = 3         # free-space violations; where the table was measured, their cost
+BEHIND = 4          # pixels behind what is shown already or what was measured
+MISSING = 5         # pixels without a reading
+SHARE = 6           # mean share of the smooth patches that it agrees with
+UNLIKELINESS = 7    # sum over the agreeing pixels of the unlikeliness of the category
+COS = 8             # the same of the cosine between rendered and measured normal
+RESIDUAL = 9        # the same of |z - d|, metres
+DELTA = 10          # change of the sum of all pixels' costs
+VIEWS = 11          # views in which any pixel agrees
 STATS = 12
-# Probability 0..255 as a cost: 1 at 2 % and less.
-UNLIKELY = np.minimum(1.0, -np.log(np.maximum(np.arange(256) / 255.0, 0.002)) / 4.0)
+# Smooth patches of one hypothesis that are counted; further ones are left out of SHARE.
+MAX_PATCHES = 64
+# Least cosine for a Gauss-Newton equation: at steeper angles the normals are no longer those of
+# the same surface.
+MIN_COSINE = 0.3
+# Residual, in tolerances, below which all equations weigh about the same.
+SOFTENING = 0.2
+
+
+class Subject(NamedTuple):
+    """
+    A hypothesis, ready to be rendered.
+
+    :ivar h: (10,) float64, see core/kernels/pose.py; `R` (3, 3) its rotation.
+    :ivar world: (V, 3) float64 vertices in the world; `faces` (F, 3) int32; `closed` bool.
+    :ivar category: class id; `me` its number in the context, -1 = none.
+    """
+
+    h: Float64Array
+    R: Float64Array
+    world: Float64Array
+    faces: Int32Array
+    closed: bool
+    category: int
+    me: int
+
+
+class Sums(NamedTuple):
+    """
+    What is summed over the pixels of one hypothesis.
+
+    :ivar stats: (STATS,) float64.
+    :ivar equations: (9, 10) float64, see core/kernels/gauss_newton.py; (0, 0) = not wanted.
+    :ivar patch: (MAX_PATCHES,) int64 smooth patches that it agrees with, then -1; `hits`
+        (MAX_PATCHES,) float64 pixels in each.
+    """
+
+    stats: Float64Array
+    equations: Float64Array
+    patch: Int64Array
+    hits: Float64Array
 
 
 @nb.njit(cache=True, inline='always')
-def posed(h, vertices, out):
-    """Write the world vertices (V, 3) of hypothesis `h` (translation, xyzw, scale) into out."""
-    R = np.empty((3, 3))
-    rotation_of(h, R)
-    for i in range(vertices.shape[0]):
-        x, y, z = vertices[i, 0] * h[7], vertices[i, 1] * h[8], vertices[i, 2] * h[9]
-        for k in range(3):
-            out[i, k] = R[k, 0] * x + R[k, 1] * y + R[k, 2] * z + h[k]
+def _cosine(subject: Subject, face: int, eye: Float64Array, normals: Float32Array,
+            i: int) -> float:
+    """Return the cosine between the normal of a face, towards the eye, and that of pixel i."""
+    world, faces = subject.world, subject.faces
+    a, b, c = faces[face, 0], faces[face, 1], faces[face, 2]
+    e0, e1, e2 = (world[b, 0] - world[a, 0], world[b, 1] - world[a, 1],
+                  world[b, 2] - world[a, 2])
+    f0, f1, f2 = (world[c, 0] - world[a, 0], world[c, 1] - world[a, 1],
+                  world[c, 2] - world[a, 2])
+    n0, n1, n2 = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
+    norm = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + 1e-20
+    # Both sides are drawn: the visible side is the one towards the camera.
+    if (n0 * (eye[0] - world[a, 0]) + n1 * (eye[1] - world[a, 1])
+            + n2 * (eye[2] - world[a, 2])) < 0:
+        norm = -norm
+    return (n0 * normals[i, 0] + n1 * normals[i, 1] + n2 * normals[i, 2]) / norm
 
 
 @nb.njit(cache=True, inline='always')
-def pixel_cost(z, d, foreground, cosine, unlikely, tolerance, w_normal, w_class, w_free):
-    """
-    Return (cost, state) of showing depth z where d was measured.
+def _ray(views: Views, view: int, column: int, row: int) -> tuple[float, float, float]:
+    """Return the direction of a pixel's ray in the world, one metre deep."""
+    K, R = views.K, views.R
+    x = (column - K[view, 0, 2]) / K[view, 0, 0]
+    y = (row - K[view, 1, 2]) / K[view, 1, 1]
+    return (R[view, 0, 0] * x + R[view, 1, 0] * y + R[view, 2, 0],
+            R[view, 0, 1] * x + R[view, 1, 1] * y + R[view, 2, 1],
+            R[view, 0, 2] * x + R[view, 1, 2] * y + R[view, 2, 2])
 
-    `unlikely` is 0 where the classifier is sure of the category and 1 where it rules it out.
-    An unexplained foreground pixel costs 1, seen table 0. State: 1 agrees, 2 seen through,
-    3 behind what is measured.
+
+@nb.njit(cache=True, inline='always')
+def _add_point_to_plane(subject: Subject, equations: Float64Array, eye: Float64Array,
+                        ray: tuple[float, float, float], reading: tuple[float, float, float],
+                        normal: tuple[float, float, float], tolerance: float) -> None:
     """
-    off = (z - d) / tolerance
-    size = min(1.0, abs(off))
-    if not foreground:
-        # Table or room was measured through the object.
-        return w_free * size, 2
-    if size >= 1.0:
-        return (1.0 if off > 0 else 0.5 + 0.5 * w_free) + 0.5 * w_class, 3 if off > 0 else 2
-    return (size + w_normal * (1.0 - max(0.0, cosine))
-            + w_class * unlikely), 1
+    Add the Gauss-Newton equation of one pixel: the distance to the tangent plane measured there.
+
+    :param reading: rendered depth, measured depth and cosine.
+    """
+    z, d, cosine = reading
+    off = z - d
+    slope = ray[0] * normal[0] + ray[1] * normal[1] + ray[2] * normal[2]
+    add_equation(equations, subject.h, subject.R,
+                 (eye[0] + ray[0] * z, eye[1] + ray[1] * z, eye[2] + ray[2] * z), normal,
+                 slope * off, cosine / (abs(off) / tolerance + SOFTENING))
+
+
+@nb.njit(cache=True, inline='always')
+def _count_patch(sums: Sums, patch: int) -> None:
+    """Count one more pixel of a smooth patch."""
+    for k in range(MAX_PATCHES):
+        if sums.patch[k] == patch:
+            sums.hits[k] += 1
+            break
+        if sums.patch[k] < 0:
+            sums.patch[k] = patch
+            sums.hits[k] = 1
+            break
+
+
+@nb.njit(cache=True, inline='always')
+def _share(sums: Sums, patch_size: Int64Array) -> float:
+    """Return the mean share of its patches that a hypothesis agrees with, weighted by pixels."""
+    share, total = 0.0, 0.0
+    for k in range(MAX_PATCHES):
+        if sums.patch[k] < 0:
+            break
+        share += sums.hits[k] * min(1.0, sums.hits[k] / patch_size[sums.patch[k]])
+        total += sums.hits[k]
+    return share / total if total > 0 else 0.0
 
 
 @nb.njit(cache=True, error_model='numpy')
-def explain_one(h, category, vertices, faces, closed, me, context, K, R_cw, t_cw, size, first,
-                depth, foreground, normals, patch, patch_size, p, p_row, tolerance, w_normal,
-                w_class, w_free, stats, pull, emit_at, out_pixel, out_depth, out_cost):
+def _render(subject: Subject, views: Views, view: int,
+            ) -> tuple[int, int, Float32Array, Int32Array]:
     """
-    Hold one hypothesis against every view.
+    Render a hypothesis into one view.
 
-    :param closed: whether only the faces towards the camera are drawn, see raster.draw.
-    :param context: what is shown already: tuple of (P,) arrays owner int32, depth float32, cost
-        float32 of the nearest member and depth, cost of the next one; inf and the cost of
-        showing nothing where there is none. Only pixels where the hypothesis is nearer count.
-    :param me: the hypothesis' own number in `context`, which is looked through; -1 = none.
-    :param size: (views, 2) int64 width, height; first (views + 1,) first pixel of each view.
-    :param depth: (P,) float32 measured, NaN none; foreground (P,) bool; normals (P, 3) float32;
-        patch (P,) int32, -1 none; patch_size (patches,) pixels over all views, empty where
-        nobody asks for SHARE.
-    :param p: (M, N + 1) uint8, p_row (P,) int32 row of a pixel or -1.
-    :param stats: (STATS,) float64, filled.
-    :param pull: (9, 10) float64, filled with the equations of kernels/pull.py; empty: not asked.
-    :param emit_at: -1, or where to write the pixel lists in out_*.
-    :return: number of pixels with a reading that it covers.
+    :return: (column, row) of the first pixel of its window, and the window's images: depth
+        (h, w) float32 metres, inf = not covered, and face (h, w) int32. Empty out of sight.
     """
-    owner, depth_1, cost_1, depth_2, cost_2 = context
-    world = np.empty(vertices.shape)
-    posed(h, vertices, world)
-    stats[:] = 0.0
-    pull[:] = 0.0
-    R = np.empty((3, 3))
+    uvz, (u0, v0, u1, v1) = raster.in_view(subject.world, views.R[view], views.t[view],
+                                           views.K[view], views.size[view])
+    depth = np.full((v1 - v0, u1 - u0), np.inf, np.float32)
+    face = np.zeros(depth.shape, np.int32)
+    if depth.size:
+        raster.draw(uvz, subject.faces, -1, u0, v0, depth, face, subject.closed)
+    return u0, v0, depth, face
+
+
+@nb.njit(cache=True, error_model='numpy')
+def _compare_view(subject: Subject, target: Target, view: int, sums: Sums, at: int,
+                  output: PixelOutput) -> int:
+    """Compare a hypothesis with one view; see compare_one."""
+    views, context, weights = target.views, target.context, target.weights
+    stats, normals, me = sums.stats, views.normals, subject.me
+    u0, v0, rendered, face = _render(subject, views, view)
+    eye = -(views.R[view].T @ views.t[view])
+    for y in range(rendered.shape[0]):
+        for x in range(rendered.shape[1]):
+            z = rendered[y, x]
+            if z == np.inf:
+                continue
+            i = views.first[view] + (y + v0) * views.size[view, 0] + x + u0
+            before, base = shown_without(context, i, me)
+            stats[SHOWN] += 1
+            if before < z:
+                stats[BEHIND] += 1
+                continue
+            d = views.depth[i]
+            if not d > 0:
+                stats[MISSING] += 1
+                continue
+            has_normal = normals[i, 0] == normals[i, 0]
+            cosine = 1.0
+            if views.foreground[i] and has_normal:
+                cosine = _cosine(subject, face[y, x], eye, normals, i)
+            unlikely = unlikeliness(views, i, subject.category)
+            cost, state = pixel_cost(z, d, views.foreground[i], cosine, unlikely, weights)
+            stats[DELTA] += cost - base
+            if at >= 0:
+                output.pixel[at], output.depth[at], output.cost[at] = i, z, cost
+                at += 1
+            if state == AGREES:
+                stats[AGREE] += 1
+                stats[GAIN] += 1.0 - cost
+                stats[COS] += cosine
+                stats[RESIDUAL] += abs(z - d)
+                stats[UNLIKELINESS] += unlikely
+                if sums.equations.shape[0] and cosine > MIN_COSINE and has_normal:
+                    normal = normals[i, 0], normals[i, 1], normals[i, 2]
+                    _add_point_to_plane(subject, sums.equations, eye,
+                                        _ray(views, view, x + u0, y + v0), (z, d, cosine),
+                                        normal, weights.tolerance_m)
+                if len(views.patch_size) and views.patch[i] >= 0:
+                    _count_patch(sums, views.patch[i])
+            elif state == SEEN_THROUGH:
+                stats[VIOLATE] += cost if not views.foreground[i] else 1.0
+            else:
+                stats[BEHIND] += 1
+    return at
+
+
+@nb.njit(cache=True, error_model='numpy')
+def compare_one(h: Float64Array, category: int, me: int, target: Target, stats: Float64Array,
+                equations: Float64Array, start: int, output: PixelOutput) -> int:
+    """
+    Compare one hypothesis with all views.
+
+    :param h: (10,) float64; `category` its class id.
+    :param me: its own number in the context, which is looked through; -1 = none.
+    :param stats: (STATS,) float64, filled. SHARE stays 0 where the views have no patch_size.
+    :param equations: (9, 10) float64, filled with the Gauss-Newton equations of the agreeing
+        pixels, see core/kernels/gauss_newton.py; (0, 0) = not wanted.
+    :param start: where to write the covered pixels with a reading in `output`; -1 = nowhere.
+    :return: where the next one would go.
+    """
+    meshes, views = target.meshes, target.views
+    vertices = meshes.vertices[meshes.vertex_start[category - 1]:meshes.vertex_start[category]]
+    faces = meshes.faces[meshes.face_start[category - 1]:meshes.face_start[category]]
+    R, world = np.empty((3, 3)), np.empty(vertices.shape)
     rotation_of(h, R)
-    n = 0
-    touched = np.empty(64, np.int64)
-    hits = np.zeros(64)
-    n_touched = 0
-    for v in range(K.shape[0]):
+    posed(h, vertices, world)
+    subject = Subject(h, R, world, faces, meshes.closed[category - 1], category, me)
+    stats[:] = 0.0
+    equations[:] = 0.0
+    sums = Sums(stats, equations, np.full(MAX_PATCHES, -1), np.zeros(MAX_PATCHES))
+    at = start
+    for view in range(views.K.shape[0]):
         agreed = stats[AGREE]
-        w = size[v, 0]
-        uvz, (u0, v0, u1, v1) = raster.in_view(world, R_cw[v], t_cw[v], K[v], size[v])
-        if u1 <= u0 or v1 <= v0:
-            continue
-        z = np.full((v1 - v0, u1 - u0), np.inf, np.float32)
-        face = np.zeros(z.shape, np.int32)
-        raster.draw(uvz, faces, -1, u0, v0, z, face, closed)
-        cam = -(R_cw[v].T @ t_cw[v])
-        for y in range(v1 - v0):
-            for x in range(u1 - u0):
-                if z[y, x] == np.inf:
-                    continue
-                i = first[v] + (y + v0) * w + x + u0
-                if owner[i] == me:
-                    before, base = depth_2[i], cost_2[i]
-                else:
-                    before, base = depth_1[i], cost_1[i]
-                stats[SHOWN] += 1
-                if before < z[y, x]:
-                    stats[BEHIND] += 1
-                    continue
-                d = depth[i]
-                if not d > 0:
-                    stats[MISSING] += 1
-                    continue
-                cosine = 1.0
-                if foreground[i] and normals[i, 0] == normals[i, 0]:
-                    a, b, c = faces[face[y, x], 0], faces[face[y, x], 1], faces[face[y, x], 2]
-                    e0, e1, e2 = (world[b, 0] - world[a, 0], world[b, 1] - world[a, 1],
-                                  world[b, 2] - world[a, 2])
-                    f0, f1, f2 = (world[c, 0] - world[a, 0], world[c, 1] - world[a, 1],
-                                  world[c, 2] - world[a, 2])
-                    n0, n1, n2 = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
-                    norm = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + 1e-20
-                    # Both sides are drawn: the facing side is the one towards the camera.
-                    if (n0 * (cam[0] - world[a, 0]) + n1 * (cam[1] - world[a, 1])
-                            + n2 * (cam[2] - world[a, 2])) < 0:
-                        norm = -norm
-                    cosine = (n0 * normals[i, 0] + n1 * normals[i, 1]
-                              + n2 * normals[i, 2]) / norm
-                unlikely = 1.0
-                if p_row[i] >= 0:
-                    unlikely = UNLIKELY[p[p_row[i], category]]
-                cost, state = pixel_cost(z[y, x], d, foreground[i], cosine, unlikely, tolerance,
-                                         w_normal, w_class, w_free)
-                stats[DELTA] += cost - base
-                if emit_at >= 0:
-                    out_pixel[emit_at + n] = i
-                    out_depth[emit_at + n] = z[y, x]
-                    out_cost[emit_at + n] = cost
-                n += 1
-                if state == 1:
-                    stats[AGREE] += 1
-                    stats[GAIN] += 1.0 - cost
-                    stats[COS] += cosine
-                    stats[RESIDUAL] += abs(z[y, x] - d)
-                    stats[UNLIKELINESS] += unlikely
-                    if pull.shape[0] and cosine > 0.3 and normals[i, 0] == normals[i, 0]:
-                        # Along the ray of the pixel from the camera's centre.
-                        a0 = (x + u0 - K[v, 0, 2]) / K[v, 0, 0]
-                        a1 = (y + v0 - K[v, 1, 2]) / K[v, 1, 1]
-                        r0 = R_cw[v, 0, 0] * a0 + R_cw[v, 1, 0] * a1 + R_cw[v, 2, 0]
-                        r1 = R_cw[v, 0, 1] * a0 + R_cw[v, 1, 1] * a1 + R_cw[v, 2, 1]
-                        r2 = R_cw[v, 0, 2] * a0 + R_cw[v, 1, 2] * a1 + R_cw[v, 2, 2]
-                        off = z[y, x] - d
-                        slope = (r0 * normals[i, 0] + r1 * normals[i, 1] + r2 * normals[i, 2])
-                        accumulate(pull, h, R, cam[0] + r0 * z[y, x], cam[1] + r1 * z[y, x],
-                                   cam[2] + r2 * z[y, x], normals[i, 0], normals[i, 1],
-                                   normals[i, 2], slope * off,
-                                   cosine / (abs(off) / tolerance + 0.2))
-                    s = patch[i] if len(patch_size) else -1
-                    if s >= 0:
-                        for k in range(n_touched):
-                            if touched[k] == s:
-                                hits[k] += 1
-                                break
-                        else:
-                            if n_touched < 64:
-                                touched[n_touched] = s
-                                hits[n_touched] = 1
-                                n_touched += 1
-                elif state == 2:
-                    stats[VIOLATE] += cost if not foreground[i] else 1.0
-                else:
-                    stats[BEHIND] += 1
+        at = _compare_view(subject, target, view, sums, at, output)
         if stats[AGREE] > agreed:
             stats[VIEWS] += 1
-    total = 0.0
-    for k in range(n_touched):
-        stats[SHARE] += hits[k] * min(1.0, hits[k] / patch_size[touched[k]])
-        total += hits[k]
-    if total > 0:
-        stats[SHARE] /= total
-    return n
+    stats[SHARE] = _share(sums, views.patch_size)
+    return at
 
 
 @nb.njit(cache=True, parallel=True)
-def explain_all(H, category, me, vertices, vertex_start, faces, face_start, closed, context, K,
-                R_cw, t_cw, size, first, depth, foreground, normals, patch, patch_size, p, p_row,
-                tolerance, w_normal, w_class, w_free, emit_at, out_pixel, out_depth, out_cost):
+def compare_all(hypotheses: Hypotheses, views: Views, meshes: Meshes, context: Context,
+                weights: PixelWeights, output: PixelOutput) -> tuple[Float64Array, Int64Array]:
     """
-    Run explain_one for every hypothesis (m, 10).
+    Run compare_one for every hypothesis.
 
-    :param category: (m,) class ids; meshes are concatenated, with faces relative to their own
-        first vertex: vertices[vertex_start[c - 1]:vertex_start[c]]; closed (categories,) bool.
-    :param emit_at: (m,) int64, where each writes its pixel lists; -1 = not at all.
-    :return: (stats (m, STATS), n (m,)).
+    :return: stats (m, STATS) float64, and (m,) int64 the pixels that each has written.
     """
-    m = H.shape[0]
+    m = hypotheses.rows.shape[0]
     stats = np.zeros((m, STATS))
     n = np.zeros(m, np.int64)
     for k in nb.prange(m):
-        c = category[k]
-        n[k] = explain_one(
-            H[k], c, vertices[vertex_start[c - 1]:vertex_start[c]],
-            faces[face_start[c - 1]:face_start[c]], closed[c - 1], me[k], context, K, R_cw, t_cw,
-            size, first, depth, foreground, normals, patch, patch_size, p, p_row, tolerance,
-            w_normal, w_class, w_free, stats[k], np.empty((0, 0)), emit_at[k], out_pixel,
-            out_depth, out_cost)
+        target = Target(views, meshes, context, weights)
+        start = output.start[k]
+        n[k] = compare_one(hypotheses.rows[k], hypotheses.category[k], hypotheses.me[k], target,
+                           stats[k], np.empty((0, 0)), start, output) - start
     return stats, n
-
-
-@nb.njit(cache=True, parallel=True)
-def polish_all(seeds, H, category, me, vertices, vertex_start, faces, face_start, closed,
-               context, K, R_cw, t_cw, size, first, depth, foreground, normals, patch,
-               patch_size, p, p_row, tolerance, w_normal, w_class, w_free, complexity, prior,
-               n_steps, sigma_t, sigma_r, sigma_s):
-    """
-    Climb with every hypothesis (m, 10), in place, against the images.
-
-    Random steps of adapting length, and after each that helped pulls until they help no more.
-
-    What falls is the cost of the scene with the hypothesis in `context` instead of its old self
-    `me`, plus complexity x the pixels it covers, plus a prior on its scale.
-
-    :return: (m,) float64 the cost reached.
-    """
-    m = H.shape[0]
-    reached = np.zeros(m)
-    for k in nb.prange(m):
-        np.random.seed(seeds[k])
-        c = category[k]
-        V = vertices[vertex_start[c - 1]:vertex_start[c]]
-        F = faces[face_start[c - 1]:face_start[c]]
-        stats, trial, q = np.empty(STATS), np.empty(10), np.empty(4)
-        here, there = np.zeros((9, 10)), np.zeros((9, 10))
-        none_i, none_f = np.empty(0, np.int64), np.empty(0, np.float32)
-        no_patches = np.empty(0, np.int64)
-        step, best, agreeing, fresh = 1.0, np.inf, 0.0, False
-        for i in range(n_steps + 1):
-            trial[:] = H[k]
-            pulls = fresh
-            if pulls:
-                pulled(here, agreeing, H[k], prior * agreeing * tolerance * tolerance, *SCALES,
-                       trial)
-                fresh = False
-            elif i > 0:
-                stepped(sigma_t, sigma_r, sigma_s, step, 1.0, q, trial)
-            explain_one(trial, c, V, F, closed[c - 1], me[k], context, K, R_cw, t_cw, size,
-                        first, depth, foreground, normals, patch, no_patches, p, p_row,
-                        tolerance, w_normal, w_class, w_free, stats, there, -1, none_i,
-                        none_f, none_f)
-            a, b, d = np.log(trial[7]), np.log(trial[8]), np.log(trial[9])
-            value = stats[DELTA] + stats[SHOWN] * (
-                complexity + prior * (a * a + b * b + d * d))
-            if value < best:
-                best = value
-                H[k] = trial
-                here, there = there, here
-                agreeing, fresh = stats[AGREE], stats[AGREE] > 20
-                if not pulls:
-                    step = min(2.0, step * 1.3)
-            elif not pulls:
-                step = max(0.05, step * 0.93)
-        reached[k] = best
-    return reached

@@ -1,29 +1,58 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The pixels that hypotheses cover, hypothesis by hypothesis: see frame.evidence.PixelLists."""
+"""The pixels that hypotheses cover, hypothesis by hypothesis."""
 
-from hooc_perception.core.frame.kernels.compare import posed
+from typing import NamedTuple
+
+from hooc_perception.core.arrays import Float32Array, Float64Array, Int64Array
+from hooc_perception.core.frame.kernels.records import Context, Hypotheses, Meshes, Views
 from hooc_perception.core.kernels import raster
+from hooc_perception.core.kernels.pose import posed
 import numba as nb
 import numpy as np
 
 
-@nb.njit(cache=True, parallel=True)
-def window_areas(H, category, vertices, vertex_start, K, R_cw, t_cw, size):
-    """Return (m,) int64, pixels of the windows of all views that hypotheses (m, 10) lie in."""
-    out = np.zeros(H.shape[0], np.int64)
-    for k in nb.prange(H.shape[0]):
-        V = vertices[vertex_start[category[k] - 1]:vertex_start[category[k]]]
-        world = np.empty(V.shape)
-        posed(H[k], V, world)
-        for v in range(K.shape[0]):
-            u0, v0, u1, v1 = raster.in_view(world, R_cw[v], t_cw[v], K[v], size[v])[1]
-            out[k] += (u1 - u0) * (v1 - v0)
-    return out
+class PixelLists(NamedTuple):
+    """
+    The pixels that each of m hypotheses covers by itself, for core.energy.compositor.
+
+    :ivar offsets: (m + 1,) int64; entries offsets[k]:offsets[k + 1] belong to row k.
+    :ivar pixel: (E,) int64 numbers among the stacked pixels of all views.
+    :ivar depth: (E,) float32 rendered, metres; `cost` (E,) float32, see kernels/compare.py.
+    """
+
+    offsets: Int64Array
+    pixel: Int64Array
+    depth: Float32Array
+    cost: Float32Array
+
+    def take(self, rows: Int64Array) -> 'PixelLists':
+        """Return the lists of the given rows."""
+        return packed(self.offsets[:-1][rows], np.diff(self.offsets)[rows], self.pixel,
+                      self.depth, self.cost)
+
+    def extended(self, other: 'PixelLists') -> 'PixelLists':
+        """Return these rows followed by those of `other`."""
+        return PixelLists(np.concatenate([self.offsets, self.offsets[-1] + other.offsets[1:]]),
+                          np.concatenate([self.pixel, other.pixel]),
+                          np.concatenate([self.depth, other.depth]),
+                          np.concatenate([self.cost, other.cost]))
+
+
+def packed(starts: Int64Array, counts: Int64Array, pixel: Int64Array, depth: Float32Array,
+           cost: Float32Array) -> PixelLists:
+    """
+    Return the PixelLists of rows that lie anywhere in longer arrays.
+
+    :param starts: (m,) int64 first entry of each row; `counts` (m,) int64 its entries.
+    """
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    return PixelLists(offsets, *_packed(starts, offsets, pixel, depth, cost))
 
 
 @nb.njit(cache=True)
-def packed(starts, offsets, pixel, depth, cost):
+def _packed(starts: Int64Array, offsets: Int64Array, pixel: Int64Array, depth: Float32Array,
+            cost: Float32Array) -> tuple[Int64Array, Float32Array, Float32Array]:
     """Return (pixel, depth, cost) without gaps: entries starts[k].. go to offsets[k].."""
     n = offsets[-1]
     out = np.empty(n, np.int64), np.empty(n, np.float32), np.empty(n, np.float32)
@@ -34,33 +63,52 @@ def packed(starts, offsets, pixel, depth, cost):
     return out
 
 
+@nb.njit(cache=True, parallel=True)
+def window_areas(hypotheses: Hypotheses, meshes: Meshes, views: Views) -> Int64Array:
+    """Return (m,) int64, pixels of the windows of all views that the hypotheses lie in."""
+    m = hypotheses.rows.shape[0]
+    out = np.zeros(m, np.int64)
+    for k in nb.prange(m):
+        c = hypotheses.category[k]
+        V = meshes.vertices[meshes.vertex_start[c - 1]:meshes.vertex_start[c]]
+        world = np.empty(V.shape)
+        posed(hypotheses.rows[k], V, world)
+        for v in range(views.K.shape[0]):
+            u0, v0, u1, v1 = raster.in_view(world, views.R[v], views.t[v], views.K[v],
+                                            views.size[v])[1]
+            out[k] += (u1 - u0) * (v1 - v0)
+    return out
+
+
 @nb.njit(cache=True)
-def compose(members, offsets, pixel, depth, cost, owner, depth_1, cost_1, depth_2, cost_2):
-    """Write nearest and next member of every pixel into the last five arrays, see explain_one."""
+def compose(members: Int64Array, lists: PixelLists, context: Context) -> None:
+    """Add rows of PixelLists to a Context, in place: nearest wins, the next one stands behind."""
     for k in members:
-        for e in range(offsets[k], offsets[k + 1]):
-            i = pixel[e]
-            if depth[e] < depth_1[i]:
-                depth_2[i], cost_2[i] = depth_1[i], cost_1[i]
-                depth_1[i], cost_1[i], owner[i] = depth[e], cost[e], k
-            elif depth[e] < depth_2[i]:
-                depth_2[i], cost_2[i] = depth[e], cost[e]
+        for e in range(lists.offsets[k], lists.offsets[k + 1]):
+            i, depth, cost = lists.pixel[e], lists.depth[e], lists.cost[e]
+            if depth < context.depth[i]:
+                context.next_depth[i], context.next_cost[i] = context.depth[i], context.cost[i]
+                context.depth[i], context.cost[i], context.owner[i] = depth, cost, k
+            elif depth < context.next_depth[i]:
+                context.next_depth[i], context.next_cost[i] = depth, cost
 
 
 @nb.njit(cache=True)
-def opinions(offsets, pixel, p_row, p, foreground, mean_p, front):
+def mean_probabilities(lists: PixelLists, views: Views, mean_p: Float64Array,
+                       foreground: Float64Array) -> None:
     """
-    Average the class probabilities over the pixels of every row of PixelLists.
+    Average the category probabilities over the pixels of every row of PixelLists.
 
-    :param mean_p: (n, N + 1) float64, starts with 0; `front` (n,) gets the foreground pixels.
+    :param mean_p: (m, N + 1) float64, starts with 0; `foreground` (m,) float64, starts with 0,
+        gets the number of foreground pixels.
     """
-    for k in range(len(offsets) - 1):
-        said = 0
-        for e in range(offsets[k], offsets[k + 1]):
-            i = pixel[e]
-            front[k] += foreground[i]
-            if p_row[i] >= 0:
-                said += 1
-                for c in range(p.shape[1]):
-                    mean_p[k, c] += p[p_row[i], c]
-        mean_p[k] /= 255.0 * max(said, 1)
+    for k in range(len(lists.offsets) - 1):
+        known = 0
+        for e in range(lists.offsets[k], lists.offsets[k + 1]):
+            i = lists.pixel[e]
+            foreground[k] += views.foreground[i]
+            if views.p_row[i] >= 0:
+                known += 1
+                for c in range(views.p.shape[1]):
+                    mean_p[k, c] += views.p[views.p_row[i], c]
+        mean_p[k] /= 255.0 * max(known, 1)

@@ -1,36 +1,49 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Leave out hypotheses that say almost the same as better ones."""
+"""Non-maximum suppression: leave out hypotheses that nearly equal better ones."""
 
+from hooc_perception.core.arrays import Float64Array, Int64Array
+from hooc_perception.core.kernels.pose import QW, QX, QY, QZ, SX, SY, SZ, TX, TY, TZ
 import numba as nb
 import numpy as np
 
+# Near duplicates: |cosine of half the angle between them|, and log ratio of their scales.
+SAME_ROTATION = 0.92
+SAME_LOG_SCALE = 0.22
+
+
+@nb.njit(cache=True, inline='always')
+def _near_duplicates(a: Float64Array, b: Float64Array, reach: float) -> bool:
+    """Return whether two hypotheses (10,) about agree in place, rotation and scale."""
+    distance2 = (a[TX] - b[TX]) ** 2 + (a[TY] - b[TY]) ** 2 + (a[TZ] - b[TZ]) ** 2
+    if distance2 >= reach * reach:
+        return False
+    # A quaternion and its negative are the same rotation.
+    cosine = abs(a[QX] * b[QX] + a[QY] * b[QY] + a[QZ] * b[QZ] + a[QW] * b[QW])
+    stretch = max(abs(np.log(a[SX] / b[SX])), abs(np.log(a[SY] / b[SY])),
+                  abs(np.log(a[SZ] / b[SZ])))
+    return cosine > SAME_ROTATION and stretch < SAME_LOG_SCALE
+
 
 @nb.njit(cache=True, error_model='numpy')
-def first_unlike(H, reach, most):
+def suppress_near_duplicates(H: Float64Array, reach: float, most: int) -> Int64Array:
     """
-    Return the first `most` rows of hypotheses (m, 10) that are no near copies of one before.
+    Return (k,) int64, the first `most` rows of H that are no near duplicates of one before.
 
-    Copies lie within `reach` metres, and about agree in orientation and in size.
+    :param H: (m, 10) float64 hypotheses, best first.
+    :param reach: near duplicates are less than this far apart, metres.
     """
     kept = np.empty(min(most, H.shape[0]), np.int64)
     n = 0
     for i in range(H.shape[0]):
         if n >= most:
             break
-        copy = False
+        duplicate = False
         for k in range(n):
-            a, b = H[i], H[kept[k]]
-            away = (a[0] - b[0]) ** 2 + (a[1] - b[1]) ** 2 + (a[2] - b[2]) ** 2
-            if away >= reach * reach:
-                continue
-            cosine = abs(a[3] * b[3] + a[4] * b[4] + a[5] * b[5] + a[6] * b[6])
-            stretch = max(abs(np.log(a[7] / b[7])), abs(np.log(a[8] / b[8])),
-                          abs(np.log(a[9] / b[9])))
-            if cosine > 0.92 and stretch < 0.22:
-                copy = True
+            if _near_duplicates(H[i], H[kept[k]], reach):
+                duplicate = True
                 break
-        if not copy:
+        if not duplicate:
             kept[n] = i
             n += 1
     return kept[:n]

@@ -1,12 +1,15 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Hypotheses held against the images: kernels against pixel by pixel Python."""
+"""Hypotheses rendered and compared with the images: kernels against pixel by pixel Python."""
 
 from collections import Counter
 from types import SimpleNamespace
 
-from hooc_perception.core.frame.evidence import hypotheses_of, PixelLists, PixelWeights
+from hooc_perception.core.frame.evidence import hypotheses_of
 from hooc_perception.core.frame.kernels import compare as kernel
+from hooc_perception.core.frame.kernels import pixel_cost
+from hooc_perception.core.frame.kernels.pixel_lists import PixelLists
+from hooc_perception.core.frame.kernels.records import PixelWeights, RefineSettings
 from hooc_perception.core.geometry import posed_vertices
 from hooc_perception.core.render import render_depth, render_patch
 import numba
@@ -59,27 +62,28 @@ def shown_pixels(scene, h, c):
 
 
 def plain_cost(residual, foreground, cosine, unlikely, w=WEIGHTS):
-    """Return (cost, state) of a pixel, see kernels/explain.py."""
+    """Return (cost, state) of a pixel, see kernels/pixel_cost.py."""
     if not foreground:
-        return w.free * min(1.0, abs(residual) / w.tolerance_m), 2
+        return w.free * min(1.0, abs(residual) / w.tolerance_m), pixel_cost.SEEN_THROUGH
     if residual >= w.tolerance_m:
-        return 1.0 + 0.5 * w.category, 3
+        return 1.0 + 0.5 * w.category, pixel_cost.OCCLUDED
     if residual <= -w.tolerance_m:
-        return 0.5 + 0.5 * w.free + 0.5 * w.category, 2
+        return 0.5 + 0.5 * w.free + 0.5 * w.category, pixel_cost.SEEN_THROUGH
     return (abs(residual) / w.tolerance_m + w.normal * (1 - max(0.0, cosine))
-            + w.category * unlikely), 1
+            + w.category * unlikely), pixel_cost.AGREES
 
 
 def plain(scene, h, c, context=None, me=-1):
     """Return ({statistic: value}, [(pixel, depth, cost)]) of one hypothesis."""
-    e = scene.evidence
+    e = scene.evidence.views
     probability = {}
     for camera, (u, v), p in zip(scene.desk.probabilities.camera, scene.desk.probabilities.uv,
                                  scene.desk.probabilities.p):
         width = scene.desk.cameras[camera].width
         first = sum(x.depth.size for x in scene.desk.observation.views[:camera])
         probability[first + int(v) * width + int(u)] = p[c] / 255
-    owner, depth_1, cost_1, depth_2, cost_2 = e.nothing if context is None else context
+    owner, depth_1, cost_1, depth_2, cost_2 = (
+        scene.evidence.nothing if context is None else context)
     stats, hits, entries, views = Counter(), Counter(), [], set()
     for i, k, z, normal in shown_pixels(scene, h, c):
         before, base = ((depth_2, cost_2) if owner[i] == me else (depth_1, cost_1))
@@ -96,7 +100,7 @@ def plain(scene, h, c, context=None, me=-1):
         cost, state = plain_cost(float(z) - float(e.depth[i]), e.foreground[i], cosine, unlikely)
         entries.append((i, z, cost))
         stats['DELTA'] += float(cost) - float(base[i])
-        if state == 1:
+        if state == pixel_cost.AGREES:
             stats['AGREE'] += 1
             stats['GAIN'] += 1 - cost
             stats['COS'] += cosine
@@ -105,7 +109,7 @@ def plain(scene, h, c, context=None, me=-1):
             views.add(k)
             if e.patch[i] >= 0:
                 hits[e.patch[i]] += 1
-        elif state == 2:
+        elif state == pixel_cost.SEEN_THROUGH:
             stats['VIOLATE'] += 1.0 if e.foreground[i] else cost
         else:
             stats['BEHIND'] += 1
@@ -122,8 +126,8 @@ NAMES = ('SHOWN', 'AGREE', 'GAIN', 'VIOLATE', 'BEHIND', 'MISSING', 'SHARE', 'UNL
 
 def agree_with_plain(scene, rows, context, me):
     """Compare statistics and pixel lists of some rows with those of plain Python."""
-    stats, lists = scene.evidence.explain(scene.H[rows], scene.category[rows], WEIGHTS, context,
-                                          lists=True, me=me)
+    stats, lists = scene.evidence.compare_pixels(scene.H[rows], scene.category[rows], WEIGHTS,
+                                                 context, me=me)
     for k, row in enumerate(rows):
         expected, entries = plain(scene, scene.H[row], scene.category[row], context, me[k])
         for name in NAMES:
@@ -145,7 +149,7 @@ def test_statistics_and_pixel_lists_are_those_of_plain_python(scene):
 
 
 def test_statistics_among_others_that_are_shown_already(scene):
-    _, lists = scene.evidence.explain(scene.H[:6], scene.category[:6], WEIGHTS, lists=True)
+    _, lists = scene.evidence.compare_pixels(scene.H[:6], scene.category[:6], WEIGHTS)
     context = scene.evidence.compose([0, 2, 4], lists)
     stats = agree_with_plain(scene, [0, 3, 4, 5, 7], context, [0, -1, 4, -1, 0])
     assert stats[1, kernel.BEHIND] > 100, 'a copy of what is shown hides nothing'
@@ -153,39 +157,39 @@ def test_statistics_among_others_that_are_shown_already(scene):
 
 def test_pixel_costs():
     def cost(residual, foreground=True, cosine=1.0, unlikely=0.0):
-        return kernel.pixel_cost(1.0 + residual, 1.0, foreground, cosine, unlikely, 0.03, 0.4, 0.5,
-                                 0.7)
+        return pixel_cost.pixel_cost(1.0 + residual, 1.0, foreground, cosine, unlikely,
+                                 PixelWeights(0.03, 0.4, 0.5, 0.7))
 
-    assert cost(0.0) == (0.0, 1)
-    assert cost(0.0, cosine=0.0) == (pytest.approx(0.4), 1)
+    assert cost(0.0) == (0.0, pixel_cost.AGREES)
+    assert cost(0.0, cosine=0.0) == (pytest.approx(0.4), pixel_cost.AGREES)
     assert cost(0.0, cosine=-1.0) == cost(0.0, cosine=0.0)
-    assert cost(0.0, unlikely=1.0) == (pytest.approx(0.5), 1)
+    assert cost(0.0, unlikely=1.0) == (pytest.approx(0.5), pixel_cost.AGREES)
     assert cost(0.015)[0] == pytest.approx(cost(-0.015)[0])
     rising = [cost(r)[0] for r in (0.0, 0.005, 0.015, 0.029)]
     assert rising == sorted(rising)
     assert rising[-1] < 1.0
     # Far off, behind the reading or seen through: no better than a bad agreement.
-    assert cost(0.1)[1] == 3
+    assert cost(0.1)[1] == pixel_cost.OCCLUDED
     assert cost(0.1)[0] >= 1.0
-    assert cost(-0.1)[1] == 2
+    assert cost(-0.1)[1] == pixel_cost.SEEN_THROUGH
     assert cost(-0.1)[0] > 0.5
     # Where the table was measured nothing can be explained.
-    assert cost(0.0, foreground=False) == (0.0, 2)
-    assert cost(-0.1, foreground=False) == (0.7, 2)
+    assert cost(0.0, foreground=False) == (0.0, pixel_cost.SEEN_THROUGH)
+    assert cost(-0.1, foreground=False) == (0.7, pixel_cost.SEEN_THROUGH)
 
 
 def test_the_category_counts(scene):
     ball_there = scene.true[2].copy()
     ball_there[7:10] = scene.desk.models[2].extents / scene.desk.models[1].extents
-    can, ball = scene.evidence.explain(np.array([scene.true[2], ball_there]), [3, 2], WEIGHTS)
+    can, ball = scene.evidence.compare(np.array([scene.true[2], ball_there]), [3, 2], WEIGHTS)
     assert can[kernel.UNLIKELINESS] < 0.1 * can[kernel.AGREE]
     assert ball[kernel.UNLIKELINESS] > 0.7 * ball[kernel.AGREE] > 100
-    blind = scene.evidence.explain(ball_there[None], [2], PixelWeights(category=0.0))[0]
+    blind = scene.evidence.compare(ball_there[None], [2], PixelWeights(category=0.0))[0]
     assert blind[kernel.GAIN] > ball[kernel.GAIN] + 0.2 * ball[kernel.AGREE]
 
 
 def test_the_true_objects_explain_what_they_cover(scene):
-    stats = scene.evidence.explain(scene.true, [1, 2, 3], WEIGHTS)
+    stats = scene.evidence.compare(scene.true, [1, 2, 3], WEIGHTS)
     covered = stats[:, kernel.SHOWN] - stats[:, kernel.BEHIND] - stats[:, kernel.MISSING]
     assert (stats[:, kernel.AGREE] > 0.9 * covered).all()
     assert (stats[:, kernel.VIEWS] == 3).all()
@@ -193,23 +197,23 @@ def test_the_true_objects_explain_what_they_cover(scene):
     assert (stats[:, kernel.RESIDUAL] / stats[:, kernel.AGREE] < 0.003).all()
     moved = scene.true.copy()
     moved[:, 0] += 0.05
-    assert (scene.evidence.explain(moved, [1, 2, 3], WEIGHTS)[:, kernel.DELTA]
+    assert (scene.evidence.compare(moved, [1, 2, 3], WEIGHTS)[:, kernel.DELTA]
             > stats[:, kernel.DELTA] + 100).all()
 
 
 def test_delta_is_the_change_of_the_composed_cost(scene):
-    _, lists = scene.evidence.explain(scene.H, scene.category, WEIGHTS, lists=True)
+    _, lists = scene.evidence.compare_pixels(scene.H, scene.category, WEIGHTS)
     for others, new in (([], 0), ([0, 1], 2), ([3, 7], 4), ([0, 4, 8, 11], 5)):
         before, after = (scene.evidence.compose(m, lists) for m in (others, [*others, new]))
         rise = after[2].astype(float).sum() - before[2].astype(float).sum()
         for context, me in ((before, -1), (after, new)):
-            stats = scene.evidence.explain(scene.H[[new]], scene.category[[new]], WEIGHTS,
+            stats = scene.evidence.compare(scene.H[[new]], scene.category[[new]], WEIGHTS,
                                            context, me=[me])
             assert stats[0, kernel.DELTA] == pytest.approx(rise, abs=0.02)
 
 
 def test_composing_is_sorting_by_depth(scene):
-    rng, n = np.random.default_rng(8), len(scene.evidence.depth)
+    rng, n = np.random.default_rng(8), len(scene.evidence.views.depth)
     pixels = [np.sort(rng.choice(300, 120, replace=False)) for _ in range(7)]
     offsets = np.cumsum([0] + [len(p) for p in pixels])
     depth, cost = rng.uniform(0.5, 1, (2, offsets[-1])).astype(np.float32)
@@ -229,32 +233,37 @@ def test_composing_is_sorting_by_depth(scene):
     assert (scene.evidence.nothing[0] == -2).all(), 'composing wrote into what is shared'
 
 
+def settings(steps):
+    """Return the settings of a refinement."""
+    return RefineSettings(0.1, 0.05, steps, 0.005, 0.06, 0.04)
+
+
 def objective(scene, H, context, me, complexity, prior):
-    """Return what polishing lowers."""
-    stats = scene.evidence.explain(H, scene.category, WEIGHTS, context, me=me)
+    """Return what refinement lowers."""
+    stats = scene.evidence.compare(H, scene.category, WEIGHTS, context, me=me)
     return stats[:, kernel.DELTA] + stats[:, kernel.SHOWN] * (
         complexity + prior * (np.log(H[:, 7:10]) ** 2).sum(1))
 
 
 @pytest.mark.parametrize('members', [[], [0, 1, 2], [3, 8]])
-def test_polishing_never_makes_its_objective_worse(scene, members):
-    _, lists = scene.evidence.explain(scene.H, scene.category, WEIGHTS, lists=True)
+def test_refinement_never_makes_its_objective_worse(scene, members):
+    _, lists = scene.evidence.compare_pixels(scene.H, scene.category, WEIGHTS)
     context = scene.evidence.compose(members, lists)
     me = np.where(np.isin(np.arange(len(scene.H)), members), np.arange(len(scene.H)), -1)
-    H = scene.evidence.polish(scene.H, scene.category, me, context, WEIGHTS, 0.1, 0.05, 25,
-                              (0.005, 0.06, 0.04), np.random.default_rng(0))
+    H = scene.evidence.refine(scene.H, scene.category, WEIGHTS, settings(25),
+                              np.random.default_rng(0), context, me)
     before, after = (objective(scene, h, context, me, 0.1, 0.05) for h in (scene.H, H))
     assert (after <= before + 1e-6).all()
     assert (after < before - 5).mean() > 0.4
     np.testing.assert_allclose(np.linalg.norm(H[:, 3:7], axis=1), 1, atol=1e-9)
 
 
-def test_polishing_brings_a_shifted_object_back(scene):
+def test_refinement_brings_a_shifted_object_back(scene):
     shifted = scene.true.copy()
     shifted[:, :2] += [[0.008, -0.006]]
     kept = shifted.copy()
-    H = scene.evidence.polish(shifted, [1, 2, 3], [-1] * 3, scene.evidence.nothing, WEIGHTS, 0.1,
-                              0.05, 80, (0.005, 0.06, 0.04), np.random.default_rng(1))
+    H = scene.evidence.refine(shifted, np.array([1, 2, 3]), WEIGHTS, settings(80),
+                              np.random.default_rng(1))
     np.testing.assert_array_equal(shifted, kept)
     off = np.linalg.norm(H[:, :3] - scene.true[:, :3], axis=1)
     assert off.max() < 0.007, 'they were 1 cm off'
@@ -265,10 +274,9 @@ def test_one_seed_one_result_whatever_the_threads(scene):
     try:
         for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
             numba.set_num_threads(threads)
-            stats, lists = scene.evidence.explain(scene.H, scene.category, WEIGHTS, lists=True)
-            H = scene.evidence.polish(scene.H, scene.category, [-1] * 18, scene.evidence.nothing,
-                                      WEIGHTS, 0.1, 0.05, 10, (0.005, 0.06, 0.04),
-                                      np.random.default_rng(3))
+            stats, lists = scene.evidence.compare_pixels(scene.H, scene.category, WEIGHTS)
+            H = scene.evidence.refine(scene.H, scene.category, WEIGHTS, settings(10),
+                                      np.random.default_rng(3), scene.evidence.nothing, [-1] * 18)
             results.append((stats, lists.offsets, lists.pixel, lists.cost, H))
     finally:
         numba.set_num_threads(known)

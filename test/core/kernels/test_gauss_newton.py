@@ -1,8 +1,9 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Pulls against a least-squares solution by numpy and against what they must bring about."""
+"""Gauss-Newton steps against numeric derivatives and what they must bring about."""
 
-from hooc_perception.core.kernels import gauss_newton as pull
+from hooc_perception.core.kernels import gauss_newton as kernel
+from hooc_perception.core.kernels.pose import SCALE_LIMITS
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -40,7 +41,7 @@ def equations(h, true, points, normals):
     n = Rotation.from_quat(true[3:7]).apply(normals)
     off = np.einsum('ij,ij->i', n, posed(h, points) - posed(true, points))
     for x, m, r in zip(posed(h, points), n, off):
-        pull.accumulate(A, h, R, *x, *m, r, 1.0)
+        kernel.add_equation(A, h, R, tuple(x), tuple(m), r, 1.0)
     return A
 
 
@@ -60,31 +61,33 @@ def test_equations_are_those_of_numeric_derivatives(rng):
     r = rng.normal(size=60)
     A, R = np.zeros((9, 10)), Rotation.from_quat(h[3:7]).as_matrix()
     for x, m, e in zip(posed(h, points), n, r):
-        pull.accumulate(A, h, R, *x, *m, e, 0.5)
+        kernel.add_equation(A, h, R, tuple(x), tuple(m), e, 0.5)
     np.testing.assert_allclose(np.triu(A[:, :9]), np.triu(0.5 * J.T @ J), atol=1e-4)
     np.testing.assert_allclose(A[:, 9], 0.5 * J.T @ r, atol=1e-4)
 
 
-def test_pulls_find_the_pose_and_the_size(rng):
+def test_steps_find_the_pose_and_the_size(rng):
     points, normals = surface(rng)
     true = hypothesis((0.01, 0.02, -0.01), (0.05, -0.04, 0.1), (1.1, 0.95, 1.05))
     h = hypothesis()
     for _ in range(40):
         out = np.empty(10)
-        pull.pulled(equations(h, true, points, normals), len(points), h, 0.0, 0.45, 2.0, out)
+        kernel.gauss_newton_step(equations(h, true, points, normals), len(points), h, 0.0,
+                                 SCALE_LIMITS, out)
         h = out
     assert np.abs(posed(h, points) - posed(true, points)).max() < 1e-3
 
 
-def test_a_pull_stays_within_its_reach_and_the_allowed_scales(rng):
+def test_a_step_stays_within_its_limits_and_the_allowed_scales(rng):
     points, normals = surface(rng)
     true, h, out = hypothesis((0.5, 0, 0), scale=(3, 3, 3)), hypothesis(), np.empty(10)
-    pull.pulled(equations(h, true, points, normals), len(points), h, 0.0, 0.45, 1.05, out)
-    assert np.linalg.norm(out[:3]) <= pull.REACH[0] + 1e-9
+    kernel.gauss_newton_step(equations(h, true, points, normals), len(points), h, 0.0,
+                             (0.45, 1.05), out)
+    assert np.linalg.norm(out[:3]) <= kernel.MAX_STEP[0] + 1e-9
     assert (out[7:] <= 1.05).all() and np.isclose(np.linalg.norm(out[3:7]), 1)
 
 
 def test_without_evidence_nothing_moves():
     h, out = hypothesis((0.1, 0.2, 0.3), (0.1, 0, 0)), np.empty(10)
-    pull.pulled(np.zeros((9, 10)), 0, h, 0.0, 0.45, 2.0, out)
+    kernel.gauss_newton_step(np.zeros((9, 10)), 0, h, 0.0, SCALE_LIMITS, out)
     np.testing.assert_allclose(out, h, atol=1e-12)

@@ -9,7 +9,7 @@ call it, all at once (`parse`) or stage by stage.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from os import PathLike
+from os import fspath, PathLike
 import time
 from typing import Any, TYPE_CHECKING, TypeVar
 
@@ -80,7 +80,7 @@ class Parser:
             does not have.
         """
         from hooc_perception.trained.folder import load_model_folder, ModelFolder
-        folder = model if isinstance(model, ModelFolder) else load_model_folder(model)
+        folder = model if isinstance(model, ModelFolder) else load_model_folder(fspath(model))
         chosen = with_overrides(profile_of(profile or folder.profile), parameters or {})
         limit = folder.max_instances if max_instances is None else max_instances
         return cls(folder.models, folder.classifier, chosen, limit, sigmas)

@@ -5,6 +5,7 @@
 from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from itertools import repeat
+from pathlib import Path
 import time
 from typing import Any, TYPE_CHECKING
 
@@ -13,6 +14,7 @@ from hooc_perception.cli import options
 from hooc_perception.errors import HoocError
 
 if TYPE_CHECKING:
+    from hooc_perception.io.bags.reader import BagScene
     from hooc_perception.io.scenes.scene import RecordedScene
     from hooc_perception.parser import Parser
 
@@ -51,7 +53,8 @@ def run(args: Namespace) -> int | None:
     from hooc_perception.trained.folder import load_model_folder
     from tqdm import tqdm
 
-    out = file_place(args.out, '--out')
+    file_place(args.out, '--out')
+    out = Path(args.out)
     folder = load_model_folder(args.model)
     scene_set = load_source(args.set, folder)
     of_file, of_scene = provenance(scene_set, args.model, out)
@@ -65,18 +68,21 @@ def run(args: Namespace) -> int | None:
     else:
         warn_of_gap(names, scene_set.category_names, args.set)
     setting = 'B' if args.true_poses else 'A'
-    results, failures = [], {}
+    results: list[dict[str, Any]] = []
+    failures: dict[str, HoocError] = {}
     with executor(args.executor):
         # One scene at a time on the cores at hand, which the stages share out between them.
         done = spread(_parsed, repeat(parser), repeat(seed),
                       (_read(s, args.true_poses) for s in scenes))
-        for scene, (parsed, seconds) in zip(scenes, tqdm(
-                done, total=len(scenes), desc='parsing', unit='scene', disable=None)):
+        progress = tqdm(total=len(scenes), desc='parsing', unit='scene', disable=None)
+        for scene, (parsed, seconds) in zip(scenes, done):
+            progress.update()
             if isinstance(parsed, HoocError):
                 failures[scene.name] = parsed
                 continue
             results.append(scene_entry(scene.name, parsed, seconds, profile=parser.profile.name,
                                        seed=seed, setting=setting, **scene.world, **of_scene))
+        progress.close()
     if results or not failures:
         write_results(out, scene_set.name, results, setting=setting, **of_file)
         print(f'{len(results)} scenes, {sum(len(r["objects"]) for r in results)} objects -> '
@@ -84,7 +90,7 @@ def run(args: Namespace) -> int | None:
     return tell_failures(failures)
 
 
-def _check_true_poses(scenes: 'Sequence[RecordedScene]', known: Sequence[str],
+def _check_true_poses(scenes: 'Sequence[RecordedScene | BagScene]', known: Sequence[str],
                       gap: str | None) -> None:
     """Reject scenes whose true poses cannot all be among the candidates."""
     for scene in scenes:
@@ -95,7 +101,7 @@ def _check_true_poses(scenes: 'Sequence[RecordedScene]', known: Sequence[str],
             raise HoocError(f'--true-poses: {gap}')
 
 
-def _read(scene: 'RecordedScene', with_truth: bool) -> Any:
+def _read(scene: 'RecordedScene | BagScene', with_truth: bool) -> Any:
     """Return (DepthViews, truth or None) of a scene, or the HoocError that it gave."""
     try:
         return scene.depth(), scene.truth if with_truth else None

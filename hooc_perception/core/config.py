@@ -62,7 +62,8 @@ class Config:
         """
         found: dict[str, Field[Any]] = {}
         for f in fields(cls):
-            inner = type(f.default).parameters() if f.metadata.get('group') else {f.name: f}
+            default: Any = f.default
+            inner = default.parameters() if f.metadata.get('group') else {f.name: f}
             twice = found.keys() & inner.keys()
             assert not twice, f'{cls.__name__} declares {twice} twice'
             found.update(inner)

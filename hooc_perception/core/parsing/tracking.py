@@ -111,4 +111,4 @@ class Tracker:
             cost[far] = 1 + cost[~far].sum()
             for i, j in zip(*linear_sum_assignment(cost)):
                 if not far[i, j]:
-                    yield rows[i], known[j]
+                    yield int(rows[i]), known[j]

@@ -1,17 +1,19 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Picture of the whole catalogue, with names.
+Draw a picture of the whole catalogue, with names.
 
 Usage: python -m hooc_perception.objects.contact_sheet OUT.png
 """
 
+from collections.abc import Mapping
 import sys
 
 from hooc_perception.objects.catalogue import CATALOGUE
 from hooc_perception.objects.shaded import Orbit, render_shaded
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
+import trimesh
 
 COLUMNS = 5
 CELL = (232, 196)
@@ -19,11 +21,12 @@ LABEL = 24
 INK = (40, 44, 52)
 
 
-def contact_sheet(meshes, columns=COLUMNS, cell=CELL):
+def contact_sheet(meshes: Mapping[str, trimesh.Trimesh], columns: int = COLUMNS,
+                  cell: tuple[int, int] = CELL) -> Image.Image:
     """
-    Return a PIL image of named meshes in a grid, each with its longest side.
+    Return a picture of named meshes in a grid, each with the length of its longest side.
 
-    :param meshes: dict of name -> trimesh.Trimesh in metres.
+    :param meshes: name -> mesh in metres.
     :param cell: (width, height) of one picture, pixels.
     """
     rows = -(-len(meshes) // columns)
@@ -41,8 +44,8 @@ def contact_sheet(meshes, columns=COLUMNS, cell=CELL):
     return sheet
 
 
-def main():
-    """Write the contact sheet to the path given."""
+def main() -> int:
+    """Write the contact sheet to the given path; return the exit status."""
     if len(sys.argv) != 2 or sys.argv[1].startswith('-'):
         print(__doc__)
         return 0 if '--help' in sys.argv or '-h' in sys.argv else 2

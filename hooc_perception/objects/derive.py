@@ -1,9 +1,11 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Derive everything that the chain needs to know about a category from its mesh, once."""
+"""Derive everything that the pipeline needs to know about a category from its mesh, once."""
 
+from hooc_perception.core.arrays import AnyArray, Float64Array, Int64Array
 from hooc_perception.core.types import GenericModel
-from hooc_perception.objects.repair import closed, from_manifold, to_manifold
+from hooc_perception.objects.manifold import from_manifold, to_manifold
+from hooc_perception.objects.repair import closed
 from hooc_perception.objects.rest import resting_poses
 from hooc_perception.objects.symmetry import axis_symmetry
 import numpy as np
@@ -14,16 +16,20 @@ INTERIOR_POINTS = 512
 MAX_FACES = 6000
 
 
-def derive(name, mesh, rng, surface_points=SURFACE_POINTS, interior_points=INTERIOR_POINTS):
+def derive(name: str, mesh: trimesh.Trimesh, rng: np.random.Generator,
+           surface_points: int = SURFACE_POINTS,
+           interior_points: int = INTERIOR_POINTS) -> GenericModel:
     """
     Return the GenericModel of a cleaned mesh; the same `rng` state gives the same model.
 
-    A mesh of more than MAX_FACES faces is simplified, within 1 % of its longest side: every
-    candidate of the category will be rendered many times.
+    A mesh of more than MAX_FACES faces is simplified, within 1 % of its longest side, because
+    every candidate of the category is rendered many times.
 
     :param name: category name.
-    :param mesh: trimesh.Trimesh as load_mesh returns it; centred here if it is not.
-    :param rng: numpy Generator for the samples.
+    :param mesh: from `load_mesh`; centred here if necessary.
+    :param rng: for the samples.
+    :param surface_points: number of samples on the surface.
+    :param interior_points: number of samples in the volume.
     """
     mesh = mesh.copy()
     mesh.apply_translation(-mesh.bounds.mean(axis=0))
@@ -31,7 +37,7 @@ def derive(name, mesh, rng, surface_points=SURFACE_POINTS, interior_points=INTER
     if len(mesh.faces) > MAX_FACES:
         solid = mesh = _simplified(solid)
     interior, doubled = sample_interior(solid, interior_points, rng)
-    points, face = trimesh.sample.sample_surface(solid, surface_points, seed=rng)
+    points, face = trimesh.sample.sample_surface(solid, surface_points, seed=rng)[:2]
     symmetry = axis_symmetry(solid, rng)
     rotations, probability = resting_poses(solid, symmetry)
     return GenericModel(
@@ -48,8 +54,8 @@ def derive(name, mesh, rng, surface_points=SURFACE_POINTS, interior_points=INTER
         symmetry=symmetry)
 
 
-def _simplified(solid):
-    """Return the solid with MAX_FACES faces or few more, its bounding box centred again."""
+def _simplified(solid: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the solid with at most about MAX_FACES faces, its bounding box centred again."""
     before, longest = to_manifold(solid), solid.extents.max()
     for share in (0.0005, 0.001, 0.002, 0.004, 0.007, 0.01):
         after = before.simplify(share * longest)
@@ -60,17 +66,18 @@ def _simplified(solid):
     return mesh
 
 
-def sample_interior(solid, count, rng, columns=6000):
+def sample_interior(solid: trimesh.Trimesh, count: int, rng: np.random.Generator,
+                    columns: int = 6000) -> tuple[Float64Array, float]:
     """
     Return (points (count, 3), doubled): points uniform in a watertight mesh's volume.
 
-    `doubled` is 1.0, or more where the surface runs through itself: the factor by which the
-    signed volume counts the shared parts too often.
+    `doubled` is 1.0, or more if the surface intersects itself: the factor by which the signed
+    volume counts the shared parts too often.
 
     Random lines parallel to the shortest axis cut the solid into intervals; laid end to end,
-    these are sampled at equal steps from a random start. A slice of a solid by a line holds
-    volume in proportion to its length, so the points are uniform, and thin sheets, where
-    rejection sampling starves, cost no more than a ball.
+    these are sampled at equal steps from a random start. The length of a line inside a solid
+    is proportional to volume, so the points are uniform, and thin sheets, for which rejection
+    sampling is slow, cost no more than a ball.
     """
     axis = int(np.argmin(solid.extents))
     u, v = (axis + 1) % 3, (axis + 2) % 3
@@ -81,7 +88,7 @@ def sample_interior(solid, count, rng, columns=6000):
     line, depth, sign = _crossings(solid.triangles[:, :, [u, v, axis]], x, y)
     order = np.lexsort((depth, line))
     line, depth, sign = line[order], depth[order], sign[order]
-    # A line that does not end outside grazed an edge between two faces: leave it out.
+    # A line that does not end outside grazed an edge between two faces: skip it.
     sound = (np.bincount(line, sign, minlength=columns) == 0)[line]
     line, depth, sign = line[sound], depth[sound], sign[sound]
     # The winding number after each crossing; the others end at zero, so one sum serves all.
@@ -99,13 +106,14 @@ def sample_interior(solid, count, rng, columns=6000):
     return points[rng.permutation(count)], max(-(sign * depth).sum() / total[-1], 1e-9)
 
 
-def _crossings(triangles, x, y):
+def _crossings(triangles: Float64Array, x: Float64Array,
+               y: Float64Array) -> tuple[Int64Array, Float64Array, AnyArray]:
     """
     Return (line, depth, sign) of the crossings of vertical lines (x ascending, y) with triangles.
 
     :param triangles: (F, 3, 3) float64, third coordinate along the lines.
     :return: index of the line, coordinate along it, and +1 where the line enters (the face
-        looks down), -1 where it leaves.
+        points down), -1 where it leaves.
     """
     a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
     doubled = ((b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1])

@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Read a user's mesh file with distrust and hand back a clean, centred mesh in metres."""
+"""Read a mesh file of unknown origin and return a clean, centred mesh in metres."""
 
 import io
 import json
@@ -8,44 +8,42 @@ import math
 from pathlib import Path
 import struct
 
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.errors import HoocError
-from hooc_perception.objects.repair import closed
 import numpy as np
 import trimesh
-
-__all__ = ['closed', 'load_mesh']
 
 MAX_BYTES = 200 * 10**6
 MAX_FACES = 2 * 10**6
 MAX_NODES = 10**4
-# A generic model is a thing on a table; anything longer was not given in metres.
+# A generic model is an object on a table; anything longer is not in metres.
 MAX_SIDE_M = 10.0
 MIN_SIDE_M = 1e-6
 ARCHIVES = {'bz2', 'zip', 'tar.gz', 'tar.bz2'}
 
 
-def load_mesh(path, scale=1.0):
+def load_mesh(path: str | Path, scale: float = 1.0) -> trimesh.Trimesh:
     """
     Return the mesh of a file: merged, without degenerate faces, centred, in metres.
 
-    The file is read from memory without a resolver, so that nothing it refers to (materials,
+    The file is read from memory without a resolver, so that no file it refers to (materials,
     textures, external buffers) is ever opened. A file with several meshes gives their union
     as one face list.
 
     :param path: PLY, OBJ, STL, OFF or another mesh format that trimesh reads.
     :param scale: model unit in metres.
-    :return: trimesh.Trimesh, float64 vertices, bounding-box centre at the origin.
-    :raises HoocError: the file is missing, empty, too large, not a mesh, has vertices that are
-        not finite, no extent along an axis, or an implausible size.
+    :return: float64 vertices, bounding-box centre at the origin.
+    :raises HoocError: if the file is missing, empty, too large or not a mesh, or the mesh has
+        vertices that are not finite, no extent along an axis, or an implausible size.
     """
     mesh = _cleaned(path, scale)
     mesh.apply_translation(-mesh.bounds.mean(axis=0))
     return mesh
 
 
-def mesh_box(path, scale=1.0):
+def mesh_box(path: str | Path, scale: float = 1.0) -> tuple[Float64Array, Float64Array]:
     """
-    Return (centre (3,), size (3,)) in metres of a file's mesh, where the file has it.
+    Return (centre (3,), size (3,)) in metres of a file's mesh, not centred.
 
     :raises HoocError: as `load_mesh`.
     """
@@ -53,8 +51,8 @@ def mesh_box(path, scale=1.0):
     return mesh.bounds.mean(axis=0), np.array(mesh.extents)
 
 
-def _cleaned(path, scale):
-    """Return the mesh of a file, in metres and where the file has it."""
+def _cleaned(path: str | Path, scale: float) -> trimesh.Trimesh:
+    """Return the cleaned mesh of a file in metres, not centred."""
     path = Path(path)
     if isinstance(scale, bool) or not isinstance(scale, (int, float)) or not (
             math.isfinite(scale) and scale > 0):
@@ -66,7 +64,7 @@ def _cleaned(path, scale):
                         'simplify it first')
     faces = np.asarray(mesh.faces, np.int64)
     if faces.min() < 0 or faces.max() >= len(mesh.vertices):
-        raise HoocError(f'mesh {path} has faces that name vertices it does not hold; '
+        raise HoocError(f'mesh {path} has faces that name vertices it does not have; '
                         'export it again')
     mesh = trimesh.Trimesh(np.asarray(mesh.vertices, np.float64) * scale, faces, process=False)
     mesh.remove_unreferenced_vertices()
@@ -87,8 +85,8 @@ def _cleaned(path, scale):
     return mesh
 
 
-def _read(path):
-    """Return the file's triangles as trimesh gives them, or raise HoocError."""
+def _read(path: Path) -> trimesh.Trimesh:
+    """Return the file's triangles as trimesh reads them, or raise HoocError."""
     if not path.is_file():
         raise HoocError(f'mesh {path} does not exist; check the path in dataset.yaml')
     size = path.stat().st_size
@@ -105,7 +103,7 @@ def _read(path):
     try:
         if kind in ('glb', 'gltf'):
             _check_gltf(data)
-        # Parsers meet arbitrary bytes here, so whatever they raise means "not a mesh".
+        # The parsers get arbitrary bytes, so whatever they raise means "not a mesh".
         scene = trimesh.load_scene(io.BytesIO(data), file_type=kind, process=False,
                                    skip_materials=True)
         _check_instances(scene)
@@ -119,8 +117,8 @@ def _read(path):
     return mesh
 
 
-def _check_gltf(data):
-    """Raise ValueError where a glTF file of little size stands for much: nodes, empty arrays."""
+def _check_gltf(data: bytes) -> None:
+    """Raise ValueError if a small glTF file expands to a lot: nodes, empty arrays."""
     if data[:4] == b'glTF':
         length, = struct.unpack_from('<I', data, 12)
         data = data[20:20 + length]
@@ -135,8 +133,8 @@ def _check_gltf(data):
         raise ValueError('it refers to other files; export it as one')
 
 
-def _check_instances(scene):
-    """Raise ValueError where the same faces are placed so often that they are too many."""
+def _check_instances(scene: trimesh.Scene) -> None:
+    """Raise ValueError if the instances of the meshes have too many faces in total."""
     names = scene.graph.nodes_geometry
     faces = sum(len(getattr(scene.geometry[scene.graph[name][1]], 'faces', ()))
                 for name in names)

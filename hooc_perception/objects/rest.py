@@ -1,32 +1,34 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Stable resting poses of a model, one for each way of lying that looks different."""
+"""Stable resting poses of a model, one per distinguishable way of lying."""
 
+from hooc_perception.core.arrays import Float64Array, Int32Array
 from hooc_perception.objects.symmetry import equivalent_directions, is_ball
 import numpy as np
 from scipy.spatial.transform import Rotation
 import trimesh
 
 MAX_POSES = 12
-# Poses whose up directions differ by less than this are one way of lying (facets of a bend).
+# Poses whose up directions differ by less than this are one pose (facets of a curved surface).
 MERGE_DEG = 12.0
-# Users stand things upright more often than chance drops them so.
+# People place objects upright more often than they would fall that way.
 UPRIGHT_PROBABILITY = 0.1
 UPRIGHT_DEG = 2.0
 MIN_PROBABILITY = 0.005
 UP = np.array([0.0, 0.0, 1.0])
 
 
-def resting_poses(solid, symmetry):
+def resting_poses(solid: trimesh.Trimesh,
+                  symmetry: Int32Array) -> tuple[Float64Array, Float64Array]:
     """
     Return (rest_rotations (R, 4) xyzw model to world, rest_probability (R,)), likeliest first.
 
     Quasi-static probabilities on the convex hull (Goldberg et al. 1999, as in trimesh), with the
-    volume's centre of mass. Poses that differ by yaw, or by a symmetry of the mesh, or by less
-    than MERGE_DEG are merged. The model's own upright pose is always there with
+    volume's centre of mass. Poses that differ by yaw, by a symmetry of the mesh, or by less than
+    MERGE_DEG are merged. The model's own upright pose is always included, with
     UPRIGHT_PROBABILITY or more.
 
-    :param solid: watertight trimesh.Trimesh.
+    :param solid: watertight.
     :param symmetry: (3,) int32 as in GenericModel.
     """
     if is_ball(symmetry):
@@ -59,7 +61,8 @@ def resting_poses(solid, symmetry):
             probability / max(probability.sum(), 1.0))
 
 
-def _merged(ups, mass, symmetry):
+def _merged(ups: Float64Array, mass: Float64Array,
+            symmetry: Int32Array) -> tuple[Float64Array, Float64Array]:
     """Return (directions (n, 3), summed probability (n,)) of clusters of up directions."""
     order = np.argsort(-mass, kind='stable')
     directions, probability, alike = [], [], []
@@ -70,20 +73,20 @@ def _merged(ups, mass, symmetry):
                 break
         else:
             group = equivalent_directions(up, symmetry)
-            # Of the poses that look alike, stand for them by the most upright one.
+            # The most upright one represents all poses that look alike.
             directions.append(group[np.argmax(group[:, 2])])
             probability.append(p)
             alike.append(group)
     return np.array(directions), np.array(probability)
 
 
-def _angles(direction, directions):
+def _angles(direction: Float64Array, directions: Float64Array) -> Float64Array:
     """Return the angles (n,) in degrees between a unit vector and unit vectors (n, 3)."""
     return np.degrees(np.arccos(np.clip(directions @ direction, -1.0, 1.0)))
 
 
-def _turn_up(direction):
-    """Return the quaternion xyzw of the shortest turn that takes a model direction to world up."""
+def _turn_up(direction: Float64Array) -> Float64Array:
+    """Return the quaternion xyzw of the smallest rotation of a model direction to world up."""
     direction = direction / np.linalg.norm(direction)
     axis = np.cross(direction, UP)
     sine = np.linalg.norm(axis)

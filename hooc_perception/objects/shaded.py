@@ -3,17 +3,20 @@
 """
 Shaded pictures of meshes, for reports and documentation only.
 
-pyrender draws them off screen by EGL or OSMesa, whichever is installed; where neither is, the
-chain's own depth renderer does, with the light computed from the depth.
+pyrender draws them off screen by EGL or OSMesa, whichever is installed. Without either, the
+package's own depth renderer draws them, with the shading computed from the depth.
 """
 
 import atexit
+from collections.abc import Sequence
 import ctypes.util
 from dataclasses import dataclass
 import functools
 import logging
 import os
+from typing import Any
 
+from hooc_perception.core.arrays import AnyArray, Float64Array, UInt8Array
 from hooc_perception.core.geometry import back_project, inverse, project, transform
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera
@@ -27,22 +30,26 @@ SMOOTH_BELOW_DEG = 25.0
 # The numpy fallback draws this many times larger and averages.
 OVERSAMPLE = 2
 
+# Vertices (V, 3) in world metres and faces (F, 3).
+_Mesh = tuple[AnyArray, AnyArray]
+_Colour = tuple[int, int, int]
+
 
 @dataclass(frozen=True)
 class Orbit:
     """
-    A view that circles the meshes and fits them into the picture.
+    A viewpoint on a circle around the meshes that fits them into the picture.
 
-    :ivar azimuth_deg: where the viewer stands, from x towards y.
-    :ivar elevation_deg: how far above the horizontal.
-    :ivar fill: share of the picture that the meshes take, by width or by height.
+    :ivar azimuth_deg: of the viewer, from x towards y.
+    :ivar elevation_deg: of the viewer above the horizontal.
+    :ivar fill: share of the picture's width or height that the meshes take.
     """
 
     azimuth_deg: float = -55.0
     elevation_deg: float = 35.0
     fill: float = 0.88
 
-    def camera(self, vertices, size):
+    def camera(self, vertices: Float64Array, size: tuple[int, int]) -> Camera:
         """Return the Camera that sees all vertices (V, 3) in a picture of size (width, height)."""
         low, high = np.min(vertices, axis=0), np.max(vertices, axis=0)
         a, e = np.radians(self.azimuth_deg), np.radians(self.elevation_deg)
@@ -50,7 +57,7 @@ class Orbit:
         right = np.array([-np.sin(a), np.cos(a), 0.0])
         T_world_camera = np.eye(4)
         T_world_camera[:3, :3] = np.column_stack([right, np.cross(-back, right), -back])
-        # Far enough for a calm perspective; the focal length then fits what is seen.
+        # Far enough for little perspective distortion; the focal length then fits the meshes.
         distance = 2.5 * max(np.linalg.norm(high - low), 0.05)
         T_world_camera[:3, 3] = (low + high) / 2 + distance * back
         u, v = project(np.eye(3), transform(inverse(T_world_camera), vertices))
@@ -62,17 +69,19 @@ class Orbit:
         return Camera('orbit', width, height, K, np.zeros(5), T_world_camera)
 
 
-def render_shaded(meshes, view=None, size=(320, 240), colours=None, background=(255, 255, 255)):
+def render_shaded(meshes: Sequence[trimesh.Trimesh | _Mesh], view: Camera | Orbit | None = None,
+                  size: tuple[int, int] = (320, 240), colours: Sequence[_Colour] | None = None,
+                  background: _Colour = (255, 255, 255)) -> UInt8Array:
     """
     Return a shaded picture (H, W, 3) uint8 of posed meshes.
 
-    :param meshes: sequence of trimesh.Trimesh or (vertices (V, 3) world metres, faces (F, 3)).
-    :param view: a rectified Camera, whose own size then counts, or an Orbit.
+    :param meshes: trimesh.Trimesh or (vertices (V, 3) world metres, faces (F, 3)).
+    :param view: a rectified Camera, whose image size is used, or an Orbit.
     :param size: (width, height) in pixels, for an Orbit.
-    :param colours: one (r, g, b) 0..255 per mesh; grey where absent.
+    :param colours: one (r, g, b) 0..255 per mesh; None = grey.
     """
     pairs = [(np.asarray(m.vertices, np.float64), np.asarray(m.faces, np.int32))
-             if hasattr(m, 'faces') else m for m in meshes]
+             if isinstance(m, trimesh.Trimesh) else m for m in meshes]
     colours = [GREY] * len(pairs) if colours is None else list(colours)
     if not isinstance(view, Camera):
         view = (view or Orbit()).camera(
@@ -80,7 +89,7 @@ def render_shaded(meshes, view=None, size=(320, 240), colours=None, background=(
     if _pyrender() is not None:
         try:
             return _by_pyrender(pairs, view, colours, background)
-        except Exception as e:  # a driver may fail in any way; the picture is still wanted
+        except Exception as e:  # a driver may fail in any way; numpy still gives a picture
             log.warning('pyrender failed (%s); shading with numpy instead', e)
             _pyrender.cache_clear()
             os.environ['HOOC_NO_GL'] = '1'
@@ -88,8 +97,8 @@ def render_shaded(meshes, view=None, size=(320, 240), colours=None, background=(
 
 
 @functools.lru_cache(maxsize=1)
-def _pyrender():
-    """Return the module pyrender with a platform that is installed, or None."""
+def _pyrender() -> Any:
+    """Return the module pyrender, set up for an installed OpenGL platform, or None."""
     if os.environ.get('HOOC_NO_GL'):
         return None
     if 'PYOPENGL_PLATFORM' not in os.environ:
@@ -98,9 +107,9 @@ def _pyrender():
         if not found:
             return None
         os.environ['PYOPENGL_PLATFORM'] = found[0]
-    # pyrender 0.1.45 still says np.infty, which numpy 2 has dropped.
+    # pyrender 0.1.45 uses np.infty, which numpy 2 has removed.
     if not hasattr(np, 'infty'):
-        np.infty = np.inf
+        setattr(np, 'infty', np.inf)
     try:
         import pyrender
     except Exception as e:
@@ -110,14 +119,15 @@ def _pyrender():
 
 
 @functools.lru_cache(maxsize=1)
-def _renderer():
-    """Return the one off-screen renderer; its size is set before each use."""
+def _renderer() -> Any:
+    """Return the off-screen renderer of this process; its size is set before each use."""
     renderer = _pyrender().OffscreenRenderer(64, 64)
     atexit.register(renderer.delete)
     return renderer
 
 
-def _by_pyrender(pairs, camera, colours, background):
+def _by_pyrender(pairs: Sequence[_Mesh], camera: Camera, colours: Sequence[_Colour],
+                 background: _Colour) -> UInt8Array:
     """Draw by OpenGL."""
     pyrender = _pyrender()
     scene = pyrender.Scene(bg_color=[*np.divide(background, 255.0), 1.0],
@@ -125,12 +135,12 @@ def _by_pyrender(pairs, camera, colours, background):
     for (vertices, faces), colour in zip(pairs, colours):
         mesh = trimesh.graph.smooth_shade(trimesh.Trimesh(vertices, faces, process=False),
                                           angle=np.radians(SMOOTH_BELOW_DEG), facet_minarea=None)
-        # Its factors are linear light, a picture's colours are not.
+        # pyrender expects linear light; the colours of a picture are gamma encoded.
         material = pyrender.MetallicRoughnessMaterial(
             baseColorFactor=[*np.divide(colour, 255.0) ** 2.2, 1.0], metallicFactor=0.0,
             roughnessFactor=0.8, doubleSided=True)
         scene.add(pyrender.Mesh.from_trimesh(mesh, material=material, smooth=True))
-    # OpenGL looks along -z with y up, and its pixel centres lie at halves.
+    # OpenGL cameras look along -z with y up, and pixel centres lie at halves.
     T_world_gl = camera.T_world_camera @ np.diag([1.0, -1.0, -1.0, 1.0])
     K = camera.K
     scene.add(pyrender.IntrinsicsCamera(K[0, 0], K[1, 1], K[0, 2] + 0.5, K[1, 2] + 0.5,
@@ -144,8 +154,9 @@ def _by_pyrender(pairs, camera, colours, background):
     return np.array(renderer.render(scene)[0], np.uint8)
 
 
-def _by_numpy(pairs, camera, colours, background):
-    """Draw with the depth renderer; the light follows from the slope of the depth."""
+def _by_numpy(pairs: Sequence[_Mesh], camera: Camera, colours: Sequence[_Colour],
+              background: _Colour) -> UInt8Array:
+    """Draw with the depth renderer; the shading follows from the slope of the depth."""
     n = OVERSAMPLE
     K = camera.K * n
     K[:2, 2] += (n - 1) / 2
@@ -155,7 +166,7 @@ def _by_numpy(pairs, camera, colours, background):
     depth, ids = render_depth(pairs, large)
     points = back_project(np.where(np.isfinite(depth), depth, np.nan), large)
     normal = np.cross(np.gradient(points, axis=1), np.gradient(points, axis=0))
-    # Next to nothing there is no slope; such a pixel faces the viewer.
+    # Beside an empty pixel there is no slope; such a pixel faces the viewer.
     back = -camera.T_world_camera[:3, 2]
     normal = np.where(np.isfinite(normal).all(-1, keepdims=True), normal, back)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import matrix_from_pose, transform
 from hooc_perception.errors import HoocError
-from hooc_perception.objects.mesh import closed
+from hooc_perception.objects.repair import closed
 from hooc_perception.synthesis.convex import convex_pieces
 from hooc_perception.synthesis.reshape import reshape
 from hooc_perception.synthesis.scatter import models_key, PlacedObject

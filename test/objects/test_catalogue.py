@@ -3,8 +3,8 @@
 """The catalogue: 25 watertight things of everyday size that a scene set can be made of."""
 
 from hooc_perception.objects.catalogue import CATALOGUE, write_catalogue
+from hooc_perception.objects.manifold import to_manifold
 from hooc_perception.objects.mesh import load_mesh
-from hooc_perception.objects.repair import to_manifold
 import manifold3d
 import numpy as np
 import pytest

@@ -4,8 +4,8 @@
 
 from hooc_perception.objects.catalogue import CATALOGUE
 from hooc_perception.objects.derive import derive, MAX_FACES, sample_interior
+from hooc_perception.objects.manifold import from_manifold, to_manifold
 from hooc_perception.objects.mesh import load_mesh
-from hooc_perception.objects.repair import from_manifold, to_manifold
 from hooc_perception.objects.symmetry import axis_symmetry, equivalent_directions
 import manifold3d
 import numpy as np

@@ -3,7 +3,8 @@
 """Solids from broken meshes; volumes are held against formulas and manifold3d."""
 
 from hooc_perception.objects.catalogue import CATALOGUE
-from hooc_perception.objects.repair import closed, SHEET_M, to_manifold
+from hooc_perception.objects.manifold import SHEET_M, to_manifold
+from hooc_perception.objects.repair import closed
 import manifold3d
 import numpy as np
 import pytest

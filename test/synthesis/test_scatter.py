@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
-from hooc_perception.objects.repair import to_manifold
+from hooc_perception.objects.manifold import to_manifold
 from hooc_perception.synthesis.scatter import inside, scatter, ScatterConfig, Scatterer
 import numpy as np
 import pytest

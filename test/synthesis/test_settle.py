@@ -1,7 +1,7 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 from hooc_perception.errors import HoocError
-from hooc_perception.objects.repair import to_manifold
+from hooc_perception.objects.manifold import to_manifold
 from hooc_perception.synthesis.convex import convex_pieces
 from hooc_perception.synthesis.scatter import ScatterConfig
 from hooc_perception.synthesis.settle import Body, BodyMaker, settle, SettleConfig, settled_models

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fork, knife, spoon and spatula: flat outlines, bent."""
 
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.objects.catalogue.shapes import (
     bent,
     curve,
@@ -10,17 +11,18 @@ from hooc_perception.objects.catalogue.shapes import (
     rounded_rectangle,
     sweep,
 )
-from manifold3d import Manifold
+from manifold3d import CrossSection, Manifold
 import numpy as np
+import numpy.typing as npt
 
 
-def _mirrored(half):
+def _mirrored(half: npt.ArrayLike) -> CrossSection:
     """Return the outline of a shape from its upper half line (n, 2) of (x, half width)."""
     half = np.asarray(half, float)
     return outline(np.vstack([half, half[::-1] * (1.0, -1.0)]))
 
 
-def fork():
+def fork() -> Manifold:
     """Return a table fork, its four tines curved upwards."""
     half = np.vstack([curve([(-0.100, 0.006), (-0.090, 0.0095), (-0.050, 0.006), (0.010, 0.004),
                              (0.030, 0.006), (0.045, 0.0125)], 22), [(0.096, 0.0125)]])
@@ -28,13 +30,13 @@ def fork():
     for y in (-0.0066, 0.0, 0.0066):
         shape -= rounded_rectangle(0.052, 0.0032, 0.0015).translate((0.076, y))
 
-    def height(x):
+    def height(x: Float64Array) -> Float64Array:
         return np.interp(x, [-0.10, -0.05, 0.02, 0.045, 0.07, 0.10],
                          [0.008, 0.014, 0.012, 0.003, 0.0, 0.008])
     return bent(shape.extrude(0.0025), height, 0.011)
 
 
-def knife():
+def knife() -> Manifold:
     """Return a table knife with a thick handle."""
     blade = outline(np.vstack([
         [(-0.01, -0.0085), (0.075, -0.0095)],
@@ -46,7 +48,7 @@ def knife():
     return blade.translate((0.0, 0.0, -0.0009)) + handle
 
 
-def spoon():
+def spoon() -> Manifold:
     """Return a table spoon."""
     ball = Manifold.sphere(1.0, 36)
     shell = ball.scale((0.034, 0.0215, 0.013)) - ball.scale((0.0325, 0.020, 0.0112))
@@ -54,13 +56,13 @@ def spoon():
     half = curve([(-0.140, 0.004), (-0.132, 0.0085), (-0.100, 0.0065), (-0.055, 0.004),
                   (-0.030, 0.006)], 18)
 
-    def height(x):
+    def height(x: Float64Array) -> Float64Array:
         return np.interp(x, [-0.14, -0.10, -0.06, -0.03], [-0.004, 0.006, 0.005, -0.0035])
     handle = bent(_mirrored(half).extrude(0.0025), height, 0.012)
     return shell + (handle - ball.scale((0.0325, 0.020, 0.0112)))
 
 
-def spatula():
+def spatula() -> Manifold:
     """Return a kitchen turner: a slotted blade at an angle on a long handle."""
     blade = _mirrored([(-0.045, 0.020), (-0.035, 0.030), (0.045, 0.040)])
     for y in (-0.018, -0.006, 0.006, 0.018):

@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plate, tray, frying pan and dustpan: things that are wide and shallow."""
+"""Plate, tray, frying pan and dustpan: wide and shallow objects."""
 
 from hooc_perception.objects.catalogue.shapes import (
     box,
@@ -12,24 +12,26 @@ from hooc_perception.objects.catalogue.shapes import (
     rounded_rectangle,
     sweep,
 )
+from manifold3d import Manifold
 import numpy as np
 
 
-def plate():
+def plate() -> Manifold:
     """Return a dinner plate with a broad rim."""
     side = [(0.062, 0.0), (0.066, 0.003), (0.078, 0.012), (0.122, 0.022), (0.123, 0.0245)]
     well = [(0.063, 0.004), (0.077, 0.0155), (0.120, 0.0246), (0.130, 0.030)]
     return filled(side) - filled(well)
 
 
-def _basin(length, width, height, radius, flare):
+def _basin(length: float, width: float, height: float, radius: float,
+           flare: float) -> Manifold:
     """Return a round-cornered block that is wider by 2 x flare at its top than at its foot."""
     low = rounded_rectangle(length - 2 * flare, width - 2 * flare, radius).extrude(0.001)
     high = rounded_rectangle(length, width, radius).extrude(0.001)
     return (low + high.translate((0.0, 0.0, height - 0.001))).hull()
 
 
-def tray():
+def tray() -> Manifold:
     """Return a serving tray with leaning sides and a grip at each end."""
     wall = 0.004
     inside = _basin(0.380 - 2 * wall, 0.270 - 2 * wall, 0.046, 0.028, 0.014)
@@ -40,7 +42,7 @@ def tray():
     return shell
 
 
-def frying_pan():
+def frying_pan() -> Manifold:
     """Return a pan with a long, rising handle that ends in an eye."""
     side = np.vstack([[(0.092, 0.0)], curve([(0.096, 0.002), (0.110, 0.024), (0.120, 0.046)], 5)])
     inside = content(side, 0.004, 0.004, 56)
@@ -53,9 +55,9 @@ def frying_pan():
     return (filled(side, 56) - inside) + (handle - inside - eye)
 
 
-def dustpan():
+def dustpan() -> Manifold:
     """Return a dustpan: a scoop with a low front edge and a high back, on a handle."""
-    def scoop(inset, lift):
+    def scoop(inset: float, lift: float) -> Manifold:
         front = box(0.004, 0.220 - 2 * inset, 0.003 + lift, at=(-0.105, 0.0, lift / 2))
         back = rounded_rectangle(0.080, 0.190 - 2 * inset, 0.030).extrude(0.058 + lift)
         return (front + back.translate((0.055 - inset, 0.0, lift / 2))).hull()

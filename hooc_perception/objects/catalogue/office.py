@@ -10,10 +10,11 @@ from hooc_perception.objects.catalogue.shapes import (
     rounded_box,
     union,
 )
+from manifold3d import Manifold
 import numpy as np
 
 
-def stapler():
+def stapler() -> Manifold:
     """Return a desk stapler, its arm raised a little over the base."""
     base = (rounded_box(0.150, 0.036, 0.008, 0.010)
             + rounded_box(0.040, 0.030, 0.026, 0.006, at=(-0.052, 0.0, 0.0)))
@@ -27,7 +28,7 @@ def stapler():
     return union(base, arm, anvil)
 
 
-def book():
+def book() -> Manifold:
     """Return a hardback that lies flat: two boards, a round spine, pages set back."""
     pages = box(0.140, 0.208, 0.028, at=(0.001, 0.0, 0.003))
     board = box(0.150, 0.220, 0.003)
@@ -37,7 +38,7 @@ def book():
     return union(pages, board, board.translate((0.0, 0.0, 0.031)), spine)
 
 
-def carton():
+def carton() -> Manifold:
     """Return a carton, such as of cereals, its lid tucked in."""
     body = box(0.150, 0.062, 0.210)
     seam = box(0.146, 0.002, 0.002, at=(0.0, 0.024, 0.2085))
@@ -45,13 +46,13 @@ def carton():
     return body - (seam + thumb)
 
 
-def sellotape_core():
+def sellotape_core() -> Manifold:
     """Return the broad ring on which adhesive tape is wound."""
     outer = cylinder(0.046, 0.024, segments=48)
     return outer - cylinder(0.0385, 0.03, at=(0.0, 0.0, -0.003), segments=48)
 
 
-def tube():
+def tube() -> Manifold:
     """Return a cardboard tube, open at both ends, lying down."""
     outer = cylinder(0.022, 0.240, at=(0.0, -0.120, 0.022), axis='y', segments=48)
     return outer - cylinder(0.0195, 0.250, at=(0.0, -0.125, 0.022), axis='y', segments=48)

@@ -1,68 +1,78 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The few ways of making a solid from which the catalogue is put together (metres, z up)."""
+"""The building blocks of the catalogue's solids (metres, z up)."""
 
+from collections.abc import Callable
+
+from hooc_perception.core.arrays import Float64Array
 from manifold3d import CrossSection, FillRule, JoinType, Manifold, Mesh64
 import numpy as np
+import numpy.typing as npt
 from scipy.interpolate import CubicSpline
 
 SEGMENTS = 40
+_Point = tuple[float, float, float]
 
 
-def curve(points, count):
+def curve(points: npt.ArrayLike, count: int) -> Float64Array:
     """Return (count, k) points of a smooth curve through (n, k) points, even in chord length."""
     points = np.asarray(points, float)
     chord = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
     return CubicSpline(chord, points)(np.linspace(0.0, chord[-1], count))
 
 
-def outline(points):
-    """Return the area inside a polygon (n, 2), whichever way round it runs."""
+def outline(points: npt.ArrayLike) -> CrossSection:
+    """Return the area inside a polygon (n, 2), in either orientation."""
     return CrossSection([np.asarray(points, float)], FillRule.NonZero)
 
 
-def ellipse(rx, ry, at=(0.0, 0.0), segments=32):
+def ellipse(rx: float, ry: float, at: tuple[float, float] = (0.0, 0.0),
+            segments: int = 32) -> CrossSection:
     """Return an ellipse of half axes rx, ry."""
     return CrossSection.circle(1.0, segments).scale((rx, ry)).translate(at)
 
 
-def rounded_rectangle(length, width, radius, segments=16):
+def rounded_rectangle(length: float, width: float, radius: float,
+                      segments: int = 16) -> CrossSection:
     """Return a centred rectangle with round corners."""
     inner = CrossSection.square((length - 2 * radius, width - 2 * radius), True)
     return inner.offset(radius, JoinType.Round, circular_segments=segments)
 
 
-def box(length, width, height, at=(0.0, 0.0, 0.0)):
-    """Return a box that stands with the centre of its bottom on `at`."""
+def box(length: float, width: float, height: float, at: _Point = (0.0, 0.0, 0.0)) -> Manifold:
+    """Return a box with the centre of its bottom at `at`."""
     return Manifold.cube((length, width, height), True).translate(
         np.add(at, (0.0, 0.0, height / 2)))
 
 
-def rounded_box(length, width, height, radius, at=(0.0, 0.0, 0.0)):
+def rounded_box(length: float, width: float, height: float, radius: float,
+                at: _Point = (0.0, 0.0, 0.0)) -> Manifold:
     """Return such a box whose upright edges are round."""
     return rounded_rectangle(length, width, radius).extrude(height).translate(at)
 
 
-def cylinder(radius, length, at=(0.0, 0.0, 0.0), axis='z', top=None, segments=SEGMENTS):
+def cylinder(radius: float, length: float, at: _Point = (0.0, 0.0, 0.0), axis: str = 'z',
+             top: float | None = None, segments: int = SEGMENTS) -> Manifold:
     """Return a cylinder, or a cone towards radius `top`, from `at` along a positive axis."""
     solid = Manifold.cylinder(length, radius, radius if top is None else top, segments)
     turn = {'x': (0.0, 90.0, 0.0), 'y': (-90.0, 0.0, 0.0), 'z': (0.0, 0.0, 0.0)}[axis]
     return solid.rotate(turn).translate(at)
 
 
-def lathe(profile, segments=SEGMENTS):
-    """Return the solid of a closed profile (n, 2) of (radius, height) turned about z."""
+def lathe(profile: npt.ArrayLike, segments: int = SEGMENTS) -> Manifold:
+    """Return the solid of a closed profile (n, 2) of (radius, height) revolved about z."""
     return outline(profile).revolve(segments)
 
 
-def filled(side, segments=SEGMENTS):
+def filled(side: npt.ArrayLike, segments: int = SEGMENTS) -> Manifold:
     """Return the full solid under a side line (n, 2) of (radius, height), bottom to top."""
     side = np.asarray(side, float)
     return lathe(np.vstack([(0.0, side[0, 1]), side, (0.0, side[-1, 1])]), segments)
 
 
-def content(side, wall, floor, segments=SEGMENTS):
-    """Return what fits into a vessel of that side line, wall and floor, and the air above it."""
+def content(side: npt.ArrayLike, wall: float, floor: float,
+            segments: int = SEGMENTS) -> Manifold:
+    """Return the inner volume of a vessel of that side line, wall and floor, open at the top."""
     side = np.asarray(side, float)
     inner = np.column_stack([np.maximum(side[:, 0] - wall, 1e-4), side[:, 1]])
     low = side[0, 1] + floor
@@ -71,14 +81,15 @@ def content(side, wall, floor, segments=SEGMENTS):
     return filled(np.vstack([inner, inner[-1] + (0.0, 0.01)]), segments)
 
 
-def sweep(path, half_width, half_height, sides=10, up=(0.0, 0.0, 1.0)):
+def sweep(path: npt.ArrayLike, half_width: npt.ArrayLike, half_height: npt.ArrayLike,
+          sides: int = 10, up: _Point = (0.0, 0.0, 1.0)) -> Manifold:
     """
     Return a rod of elliptic section along a path.
 
     :param path: (n, 3) points.
     :param half_width: scalar or (n,) half axis across the path and across `up`.
     :param half_height: scalar or (n,) half axis across the path, nearest to `up`.
-    :param up: direction that the path never takes.
+    :param up: a direction that the path never has.
     """
     path = np.asarray(path, float)
     n = len(path)
@@ -104,16 +115,17 @@ def sweep(path, half_width, half_height, sides=10, up=(0.0, 0.0, 1.0)):
         Mesh64(vertices, np.vstack(faces)[:, ::-1].astype(np.uint64).copy()))
 
 
-def bent(solid, height_at, edge):
-    """Return a solid whose points are lifted by height_at(x), its edges cut to `edge` first."""
-    def lift(points):
+def bent(solid: Manifold, height_at: Callable[[Float64Array], Float64Array],
+         edge: float) -> Manifold:
+    """Return a solid whose points are lifted by height_at(x), edges first split to `edge`."""
+    def lift(points: npt.ArrayLike) -> Float64Array:
         points = np.array(points)
         points[:, 2] += height_at(points[:, 0])
         return points
     return solid.refine_to_length(edge).warp_batch(lift)
 
 
-def union(*solids):
+def union(*solids: Manifold) -> Manifold:
     """Return the union of solids."""
     total = solids[0]
     for solid in solids[1:]:

@@ -7,12 +7,12 @@ from manifold3d import Manifold
 import numpy as np
 
 
-def ball():
+def ball() -> Manifold:
     """Return a ball."""
     return Manifold.sphere(0.036, 48)
 
 
-def banana():
+def banana() -> Manifold:
     """Return a banana that lies on its side, with a stalk."""
     along = np.linspace(0, 1, 24)
     angle = np.radians(-52 + 104 * along)
@@ -23,7 +23,7 @@ def banana():
     return sweep(path, girth, girth * 0.95, sides=7)
 
 
-def can():
+def can() -> Manifold:
     """Return a drinks can with a drawn-in neck, a rim and a dished bottom."""
     side = [(0.024, 0.0), (0.033, 0.010), (0.033, 0.100), (0.0275, 0.1115), (0.0285, 0.113),
             (0.0285, 0.1155)]

@@ -12,10 +12,11 @@ from hooc_perception.objects.catalogue.shapes import (
     sweep,
     union,
 )
+from manifold3d import Manifold
 import numpy as np
 
 
-def hammer():
+def hammer() -> Manifold:
     """Return a claw hammer that lies on its side."""
     path = np.column_stack([np.linspace(-0.190, 0.105, 14), np.zeros((14, 2))])
     width = np.interp(path[:, 0], [-0.19, -0.18, -0.10, -0.05, 0.06, 0.105],
@@ -32,7 +33,7 @@ def hammer():
     return union(handle, neck, face, eye, claw - wedge)
 
 
-def screwdriver():
+def screwdriver() -> Manifold:
     """Return a screwdriver with a fluted handle and a flat tip, lying down."""
     angle = np.linspace(0, 2 * np.pi, 48, endpoint=False)
     radius = 0.0145 + 0.0013 * np.cos(6 * angle)
@@ -46,7 +47,7 @@ def screwdriver():
     return union(grip, end, collar, shaft, tip)
 
 
-def drill():
+def drill() -> Manifold:
     """Return a cordless drill that stands on its battery."""
     body = cylinder(0.029, 0.110, at=(-0.075, 0.0, 0.160), axis='x', segments=28)
     back = cylinder(0.022, 0.011, at=(-0.085, 0.0, 0.160), axis='x', top=0.029, segments=28)
@@ -62,9 +63,9 @@ def drill():
     return union(body, back, chuck, bit, grip, trigger, battery)
 
 
-def scissors():
+def scissors() -> Manifold:
     """Return a pair of scissors, a little open, lying flat."""
-    def half(side):
+    def half(side: float) -> Manifold:
         ring = ellipse(0.027, 0.0185, segments=28) - ellipse(0.019, 0.0115, segments=28)
         ring = ring.rotate(-12.0).translate((-0.072, -0.020))
         arm = outline([(-0.056, -0.017), (-0.046, -0.003), (0.004, 0.008), (0.008, -0.005),

@@ -2,10 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write meshes and the default rig as a scene set that has no scenes yet."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+import trimesh
 import yaml
 
 RIG = ('kinect1', 'kinect2', 'kinect3')
@@ -17,11 +20,11 @@ K = (365.5, 0.0, 257.0, 0.0, 365.5, 207.5, 0.0, 0.0, 1.0)
 D = (0.09, -0.27, 0.0, 0.0, 0.09)
 
 
-def default_cameras():
+def default_cameras() -> dict[str, dict[str, Any]]:
     """
     Return the entries of cameras.yaml for three Kinect v2 around a table.
 
-    They stand at the corners of an equilateral triangle, RIG_DISTANCE_M from a point just over
+    They are at the corners of an equilateral triangle, RIG_DISTANCE_M from a point just above
     the middle of the table, and look down at it by RIG_TILT_DEG.
     """
     out = {}
@@ -44,8 +47,8 @@ def default_cameras():
     return out
 
 
-def write_catalogue(folder, name, meshes):
-    """Write a `hooc-scenes/1` folder of meshes (name -> trimesh.Trimesh); return its path."""
+def write_catalogue(folder: str | Path, name: str, meshes: Mapping[str, trimesh.Trimesh]) -> Path:
+    """Write a `hooc-scenes/1` folder of named meshes without scenes; return its path."""
     folder = Path(folder)
     (folder / 'models').mkdir(parents=True, exist_ok=True)
     for category, mesh in meshes.items():

@@ -101,7 +101,9 @@ class Evidence:
 
     def compose(self, members: AnyArray | Sequence[int], lists: PixelLists) -> Context:
         """Return the Context that the given rows of PixelLists make; nearest wins."""
-        context = Context(*(a.copy() for a in self.nothing))
+        none = self.nothing
+        context = Context(none.owner.copy(), none.depth.copy(), none.cost.copy(),
+                          none.next_depth.copy(), none.next_cost.copy())
         pixel_lists.compose(np.asarray(members, np.int64), lists, context)
         return context
 

@@ -32,7 +32,7 @@ def merged_pairs(objects: Candidates, models: Sequence[GenericModel],
     rows, pairs = [], []
     for i in range(len(objects)):
         for j in np.flatnonzero(objects.category == objects.category[i]):
-            box = None if j == i else _around(objects, R, i, j)
+            box = None if j == i else _around(objects, R, i, int(j))
             if box is not None:
                 rows.append((i, *box))
                 pairs.append((i, j))

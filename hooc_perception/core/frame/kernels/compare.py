@@ -193,7 +193,7 @@ def _compare_view(subject: Subject, target: Target, view: int, sums: Sums, at: i
             z = rendered[y, x]
             if z == np.inf:
                 continue
-            i = views.first[view] + (y + v0) * views.size[view, 0] + x + u0
+            i: int = views.first[view] + (y + v0) * views.size[view, 0] + x + u0
             before, base = shown_without(context, i, me)
             stats[SHOWN] += 1
             if before < z:

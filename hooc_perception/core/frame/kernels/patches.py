@@ -36,7 +36,7 @@ def smooth_labels(points: Float64Array, normals: Float64Array, radius: float, sm
             for dy in range(-1, 2):
                 # Cells along z are consecutive.
                 first = key[i] + (dx * shape[1] + dy) * shape[2] - 1
-                j_at = np.searchsorted(ordered, first)
+                j_at = int(np.searchsorted(ordered, first))
                 while j_at < n and ordered[j_at] <= first + 2:
                     j = order[j_at]
                     j_at += 1

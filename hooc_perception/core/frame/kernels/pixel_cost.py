@@ -54,6 +54,8 @@ def shown_without(context: Context, i: int, me: int) -> tuple[float, float]:
 @nb.njit(cache=True, inline='always')
 def unlikeliness(views: Views, i: int, category: int) -> float:
     """Return u of a category at pixel i; 1 where the classifier says background."""
-    if views.p_row[i] >= 0:
-        return UNLIKELY[views.p[views.p_row[i], category]]
-    return 1.0
+    row: int = views.p_row[i]
+    if row < 0:
+        return 1.0
+    p: int = views.p[row, category]
+    return UNLIKELY[p]

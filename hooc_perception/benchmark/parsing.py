@@ -7,7 +7,7 @@ from hooc_perception.benchmark.scene import candidate_meshes
 from hooc_perception.core.energy.eq1 import D_MAX_M, Eq1
 from hooc_perception.core.energy.local_search import local_search
 from hooc_perception.core.energy.overlap import pairwise, union_shares
-from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.geometry import matrix_from_pose, stage_rng
 from hooc_perception.core.methods.genetic import genetic_search, GeneticConfig
 from hooc_perception.core.render import render_depth
 from hooc_perception.objects.repair import closed
@@ -145,6 +145,6 @@ def _solid(pool, models, k):
     model = models[pool.category[k] - 1]
     mesh = closed(trimesh.Trimesh(model.vertices, model.faces, process=False))
     vertices = np.asarray(mesh.vertices) * (pool.size[k] / model.extents)
-    world = trimesh.transform_points(vertices, pool.T_world_model(k))
+    world = trimesh.transform_points(vertices, matrix_from_pose(pool.translation[k], pool.rotation_xyzw[k]))
     return manifold3d.Manifold(manifold3d.Mesh(world.astype(np.float32),
                                                np.asarray(mesh.faces, np.uint32)))

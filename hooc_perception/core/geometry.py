@@ -2,17 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rigid transforms and pinhole projection. `T_a_b` maps points of frame b into frame a."""
 
-from typing import TYPE_CHECKING
 import zlib
 
 from hooc_perception.core.arrays import AnyArray, Float32Array, Float64Array
+from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
 import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
-
-if TYPE_CHECKING:
-    from hooc_perception.core.types import Camera, GenericModel
 
 
 def matrix_from_pose(translation: npt.ArrayLike, rotation_xyzw: npt.ArrayLike) -> Float64Array:
@@ -69,13 +66,13 @@ def rays(K: Float64Array, height: int, width: int) -> Float64Array:
     return np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(u.shape)], -1)
 
 
-def back_project(depth: Float32Array, camera: 'Camera') -> Float64Array:
+def back_project(depth: Float32Array, camera: Camera) -> Float64Array:
     """Return (H, W, 3) float64 world points of a rectified (H, W) depth image; NaN stays."""
     points = rays(camera.K, *depth.shape) * depth[..., None]
     return transform(camera.T_world_camera, points)
 
 
-def posed_vertices(model: 'GenericModel', translation: npt.ArrayLike,
+def posed_vertices(model: GenericModel, translation: npt.ArrayLike,
                    rotation_xyzw: npt.ArrayLike, size: npt.ArrayLike) -> Float64Array:
     """Return (V, 3) world vertices of a GenericModel scaled to `size` and posed."""
     scaled = model.vertices * (np.asarray(size, np.float64) / np.maximum(model.extents, 1e-9))

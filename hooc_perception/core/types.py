@@ -20,7 +20,6 @@ from hooc_perception.core.arrays import (
     UInt8Array,
     UInt16Array,
 )
-from hooc_perception.core.geometry import matrix_from_pose
 import numpy as np
 
 
@@ -147,10 +146,6 @@ class Candidates:
         return Candidates(*(np.concatenate([getattr(self, name), getattr(other, name)])
                             for name in ('category', 'translation', 'rotation_xyzw', 'size',
                                          'score')))
-
-    def T_world_model(self, i: int) -> Float64Array:
-        """Return the (4, 4) rigid transform of row i; scale by `size / model.extents` first."""
-        return matrix_from_pose(self.translation[i], self.rotation_xyzw[i])
 
 
 @dataclass(frozen=True)

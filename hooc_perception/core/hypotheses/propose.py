@@ -7,11 +7,11 @@ Hypotheses are sampled and refined in the voxel field (sampling.py), then ranked
 ranked again in the images.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from hooc_perception.core.arrays import Float64Array, Int64Array
+from hooc_perception.core.arrays import AnyArray, Float64Array, Int64Array
 from hooc_perception.core.frame.costs import PixelCosts
 from hooc_perception.core.frame.evidence import Evidence, hypotheses_of
 from hooc_perception.core.frame.frame import Frame
@@ -114,8 +114,8 @@ def _ranked(frame: Frame, ranking: _Ranking, rng: np.random.Generator, H: Float6
     return candidates_of(H[rows], category[rows], score[rows], models)
 
 
-def candidates_of(H: Float64Array, category: Int64Array, score: Float64Array,
-                  models: tuple[GenericModel, ...]) -> Candidates:
+def candidates_of(H: Float64Array, category: AnyArray, score: AnyArray,
+                  models: Sequence[GenericModel]) -> Candidates:
     """Return Candidates from hypotheses (m, 10+), class ids and scores."""
     extents = np.array([models[c - 1].extents for c in category]).reshape(-1, 3)
     return Candidates(category.astype(np.uint16), H[:, TRANSLATION].copy(),

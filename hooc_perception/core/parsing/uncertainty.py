@@ -121,7 +121,7 @@ class _Cost:
 
 def _wider(p_flip: float) -> float:
     """Return the factor that makes WITHIN of all errors out of WITHIN of those without a flip."""
-    return np.sqrt(chi2.ppf(WITHIN / (1 - p_flip), 3) / chi2.ppf(WITHIN, 3))
+    return float(np.sqrt(chi2.ppf(WITHIN / (1 - p_flip), 3) / chi2.ppf(WITHIN, 3)))
 
 
 def _information(cost: _Cost, longest: Float64Array) -> Float64Array:

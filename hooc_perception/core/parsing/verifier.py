@@ -81,7 +81,7 @@ def margins(energy: JointEnergy, siblings: BoolArray) -> Float64Array:
     joining = np.where(energy.mask, 0.0, energy.joining_costs())
     leave = energy.deltas()[members]
     without = np.full(energy.n, -np.inf)
-    for i, a in enumerate(members):
+    for i, a in enumerate(members.tolist()):
         energy.flip(a)
         swapped = leave[i] + energy.deltas()
         energy.flip(a)

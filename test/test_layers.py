@@ -112,6 +112,38 @@ def test_layer_imports_only_what_lies_below(layer):
     assert not found, '\n'.join(found)
 
 
+# The rooms of core from the lowest floor up; each may import from those before it.
+CORE = ('kernel_cache', 'arrays', 'config', 'types', 'kernels', 'geometry', 'symmetry', 'memo',
+        'render', 'segment', 'frame', 'classification', 'energy', 'hypotheses', 'parsing',
+        'methods', 'profiles')
+
+
+def rooms_above(path, package=PACKAGE):
+    """Return one sentence for each import of a core module that leads to a higher room."""
+    relative = path.relative_to(package / 'core')
+    room = relative.parts[0].removesuffix('.py')
+    allowed = CORE[:CORE.index(room) + 1]
+    return [f'core/{relative.as_posix()}:{line}: {room} must not import {module}'
+            for line, module in imported_modules(path)
+            if module.startswith('hooc_perception.core.') and module.split('.')[2] not in allowed]
+
+
+def test_core_imports_run_downwards():
+    files = [path for path in (PACKAGE / 'core').rglob('*.py') if path.parent.name != 'core'
+             or path.name != '__init__.py']
+    assert len(files) > 50
+    found = [text for path in files for text in rooms_above(path)]
+    assert not found, '\n'.join(found)
+
+
+def test_an_upward_import_is_noticed(tmp_path):
+    path = tmp_path / 'core' / 'frame' / 'bad.py'
+    path.parent.mkdir(parents=True)
+    path.write_text('from hooc_perception.core.parsing.search import Search\n'
+                    'from hooc_perception.core.types import Camera\n')
+    assert len(rooms_above(path, tmp_path)) == 1
+
+
 def test_every_folder_has_a_rule():
     folders = {path.parent.relative_to(PACKAGE).parts[0] for path in PACKAGE.glob('*/**/*.py')}
     folders |= {path.parent.name for path in PACKAGE.glob('*/*.py')}

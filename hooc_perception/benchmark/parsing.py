@@ -145,6 +145,7 @@ def _solid(pool, models, k):
     model = models[pool.category[k] - 1]
     mesh = closed(trimesh.Trimesh(model.vertices, model.faces, process=False))
     vertices = np.asarray(mesh.vertices) * (pool.size[k] / model.extents)
-    world = trimesh.transform_points(vertices, matrix_from_pose(pool.translation[k], pool.rotation_xyzw[k]))
+    T_world_model = matrix_from_pose(pool.translation[k], pool.rotation_xyzw[k])
+    world = trimesh.transform_points(vertices, T_world_model)
     return manifold3d.Manifold(manifold3d.Mesh(world.astype(np.float32),
                                                np.asarray(mesh.faces, np.uint32)))

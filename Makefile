@@ -13,7 +13,7 @@ KEEP ?=
 FORCE ?=
 JOBS ?= 0
 
-.PHONY: help setup demo test results bundle lint lock clean
+.PHONY: help setup demo test results bundle lint docs lock clean
 
 help:
 	@echo 'make demo    set up if need be, then find the objects of the bundled scene'
@@ -23,7 +23,8 @@ help:
 	@echo '             ROWS="best fast ablations", KEEP="paper fpfh ppf", FORCE="best", RESULTS=folder,'
 	@echo '             JOBS=1'
 	@echo 'make bundle  make the bundled scene and model again'
-	@echo 'make lint    check the style'
+	@echo 'make lint    check style, spelling and types'
+	@echo 'make docs    build the documentation site in out/site'
 	@echo 'make lock    resolve pyproject.toml into requirements.txt again (PYTHONS="python3.11 python3.12")'
 
 setup:
@@ -45,6 +46,11 @@ bundle: setup
 
 lint: setup
 	@.venv/bin/ruff check .
+	@.venv/bin/codespell
+	@.venv/bin/pyright
+
+docs: setup
+	@NO_MKDOCS_2_WARNING=1 .venv/bin/mkdocs build --strict
 
 lock:
 	@.venv/bin/python scripts/lock.py $(PYTHONS)

@@ -4,8 +4,11 @@
 
 import argparse
 import importlib
+import os
 from pathlib import Path
 import re
+import subprocess
+import sys
 import tomllib
 
 from hooc_perception.cli import main as cli
@@ -89,3 +92,15 @@ def test_names_of_parameters_and_reasons_exist(page):
     names = {name.rpartition('.')[2] for name in re.findall(r'`([a-z][a-z_.]*_[a-z_.]*)`', text)}
     unknown = {name for name in names if not re.search(rf'\b{re.escape(name)}\b', code)}
     assert len(names) > 1 and not unknown
+
+
+def test_the_site_builds_without_a_warning(tmp_path):
+    pytest.importorskip('mkdocs')
+    pytest.importorskip('mkdocstrings')
+    command = [sys.executable, '-m', 'mkdocs', 'build', '--strict', '-q', '-d', str(tmp_path)]
+    run = subprocess.run(command, cwd=ROOT, capture_output=True, text=True,
+                         env={**os.environ, 'NO_MKDOCS_2_WARNING': '1'})
+    assert run.returncode == 0, run.stdout + run.stderr
+    page = (tmp_path / 'api' / 'index.html').read_text()
+    assert 'id="hooc_perception.parser.Parser.parse"' in page
+    assert '<pre class="mermaid">' in (tmp_path / 'index.html').read_text()

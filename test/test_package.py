@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 from hooc_perception.extras import advice, EXTRA_OF
 from packaging.requirements import Requirement
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 NODES = ['ingestion_node', 'classification_node', 'candidate_node', 'parsing_node', 'replay_node']
@@ -137,3 +138,20 @@ def test_every_dependency_is_pinned():
 @pytest.mark.parametrize('script', ['scripts/setup.sh', '.ci/run'])
 def test_shell_scripts_parse(script):
     subprocess.run(['bash', '-n', str(ROOT / script)], check=True)
+
+
+def test_citation_has_the_version_of_the_package():
+    citation = yaml.safe_load((ROOT / 'CITATION.cff').read_text())
+    assert citation['version'] == MANIFEST.findtext('version')
+    assert citation['license'] == MANIFEST.findtext('license')
+    assert [row['family-names'] for row in citation['references'][0]['authors']] == [
+        'Basevi', 'Leonardis']
+
+
+def test_the_workflow_runs_what_contributors_run():
+    jobs = yaml.safe_load((ROOT / '.github/workflows/ci.yml').read_text())['jobs']
+    run = {name: [step['run'] for step in job['steps'] if 'run' in step]
+           for name, job in jobs.items()}
+    assert run['ubuntu'] == ['make test'] and run['debian'][-1] == 'make test'
+    assert jobs['ubuntu']['strategy']['matrix']['python'] == ['3.11', '3.12']
+    assert run['docs'] == ['make docs']

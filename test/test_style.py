@@ -45,6 +45,14 @@ def test_ruff_notices_what_ament_would(tmp_path):
     assert found >= {'I001', 'D100', 'D400', 'D401', 'D403', 'Q000', 'F841', 'F401'}
 
 
+def test_spelling():
+    run = subprocess.run([sys.executable, '-m', 'codespell_lib'], cwd=ROOT, capture_output=True,
+                         text=True)
+    if 'No module named' in run.stderr:
+        pytest.skip('codespell is not installed here')
+    assert run.returncode == 0, run.stdout + run.stderr
+
+
 def test_every_file_carries_the_licence():
     bare = [str(path.relative_to(ROOT)) for path in SOURCES + [ROOT / 'setup.py']
             if not path.read_text().startswith(HEADER)]

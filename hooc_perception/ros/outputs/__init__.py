@@ -1,3 +1,3 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""From results to topics, services and planners."""
+"""Results as topics, services and planning scenes."""

@@ -1,21 +1,30 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The service `detect`: what stands there now, not when it was last looked at."""
+"""The service `detect`: the objects as they are now, not as of the last result."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import json
 import math
 import time
 
+from hooc_perception.ros.lifecycle.stage_node import StageNode
+from hooc_perception.ros.outputs.detected import DetectedScene
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.clock import Clock, ClockType
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.task import Future
 from std_srvs.srv import Trigger
 
 
 @dataclass
 class _Call:
-    """Somebody who waits: since when by the node's clock, until when by the steady one."""
+    """
+    A pending call.
+
+    :ivar called_ns: when it came, by the clock of the node.
+    :ivar deadline: time.monotonic() until which it waits.
+    """
 
     called_ns: int
     deadline: float
@@ -24,26 +33,31 @@ class _Call:
 
 class DetectService:
     """
-    Answer each call with the first frame set that is newer than the call.
+    Answer each call with the result of the first frame set that is newer than the call.
 
-    The callback is a coroutine in a group of its own: while it waits, the node works on. The
-    deadline is kept by the steady clock: simulated time may stand still.
+    The callback is a coroutine in a group of its own, so that the node keeps working while it
+    waits. The deadline uses the steady clock, because simulated time may stand still.
 
-    The service lives as long as its node, in every lifecycle state: who waits is answered after
-    the transition that ended the waiting, and who calls a node that is not active learns it.
+    The service lives as long as its node, in every lifecycle state: pending calls are answered
+    after the transition that ended the wait, and calls to an inactive node fail at once.
 
-    :param refusal: callable that returns why no answer of the active node can come, or None.
+    :param node: a StageNode whose config has detect_timeout_s.
+    :param refusal: returns why the active node cannot produce a result, or None.
     """
 
-    def __init__(self, node, refusal=lambda: None):
-        """Offer `detect` on a StageNode whose config has detect_timeout_s."""
+    def __init__(self, node: StageNode, refusal: Callable[[], str | None] = lambda: None) -> None:
+        """Offer `detect`."""
         self._node, self._refusal = node, refusal
-        self._waiting, self._last_ns = [], None
-        node.create_service(Trigger, 'detect', self._on_call,
+        self._waiting: list[_Call] = []
+        self._last_ns: int | None = None    # stamp of the last frame set
+        # rclpy awaits coroutines, though its annotation of callbacks does not say so.
+        node.create_service(Trigger, 'detect',
+                            self._on_call,      # pyright: ignore[reportArgumentType]
                             callback_group=ReentrantCallbackGroup())
         node.create_timer(0.2, self._give_up, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    async def _on_call(self, request, response):
+    async def _on_call(self, request: Trigger.Request,
+                       response: Trigger.Response) -> Trigger.Response:
         reason = self._refusal() if self._node.active else 'the node is not active: activate it'
         if reason:
             response.success, response.message = False, refusal_json(reason)
@@ -51,13 +65,15 @@ class DetectService:
         call = _Call(self._node.now_ns(),
                      time.monotonic() + self._node.config.detect_timeout_s, Future())
         self._waiting.append(call)
-        response.success, response.message = await call.future
+        # Without annotations, rclpy's futures look as if they returned None.
+        success, text = await call.future       # pyright: ignore[reportGeneralTypeIssues]
+        response.success, response.message = success, text
         return response
 
-    def answer(self, scene):
-        """Reply with a DetectedScene to everybody who called before its frame set was taken."""
+    def answer(self, scene: DetectedScene) -> None:
+        """Answer all calls that are older than the frame set of this result."""
         if self._last_ns is not None and scene.stamp_ns < self._last_ns:
-            for call in self._waiting:      # time was set back: all that comes now is newer
+            for call in self._waiting:      # time was set back: any frame set is newer now
                 call.called_ns = scene.stamp_ns - 1
         self._last_ns = scene.stamp_ns
         served = [call for call in self._waiting if call.called_ns < scene.stamp_ns]
@@ -67,38 +83,37 @@ class DetectService:
                 self._waiting.remove(call)
                 call.future.set_result((True, text))
 
-    def fail(self, reason):
-        """Tell everybody who waits that no answer will come."""
+    def fail(self, reason: str) -> None:
+        """Fail all pending calls."""
         while self._waiting:
             self._waiting.pop().future.set_result((False, refusal_json(reason)))
 
-    def forget(self):
-        """Forget when the last frame set was taken."""
+    def forget(self) -> None:
+        """Forget the stamp of the last frame set."""
         self._last_ns = None
 
-    def _give_up(self):
+    def _give_up(self) -> None:
         now = time.monotonic()
         for call in [c for c in self._waiting if c.deadline < now]:
             self._waiting.remove(call)
             call.future.set_result((False, refusal_json(self._complaint(call))))
 
-    def _complaint(self, call):
+    def _complaint(self, call: _Call) -> str:
         text = 'no frame set newer than the call was parsed in time: '
         if self._last_ns is None:
-            return text + 'none was at all; look at /diagnostics for cameras that do not deliver'
+            return text + 'there was none at all; check /diagnostics for silent cameras'
         age_s = (call.called_ns - self._last_ns) * 1e-9
-        return text + (f'the last one was taken {age_s:.1f} s before; look at /diagnostics for '
-                       'cameras that do not deliver, and set use_sim_time where a bag keeps its '
-                       'own stamps')
+        return text + (f'the last one was taken {age_s:.1f} s before; check /diagnostics for '
+                       'silent cameras, and set use_sim_time if a bag keeps its own stamps')
 
 
-def refusal_json(reason):
-    """Return the JSON that `detect` answers where there is no scene to tell of."""
+def refusal_json(reason: str) -> str:
+    """Return the JSON that `detect` answers if there is no result."""
     return json.dumps({'error': reason})
 
 
-def scene_json(scene):
-    """Return the JSON of a DetectedScene, as `detect` answers."""
+def scene_json(scene: DetectedScene) -> str:
+    """Return the JSON of a result, as `detect` answers."""
     return json.dumps({
         'stamp_ns': scene.stamp_ns, 'frame': scene.frame,
         'objects': [{'id': o.id, 'category': o.category, 'score': o.score,
@@ -108,5 +123,5 @@ def scene_json(scene):
                     for o in scene.objects]})
 
 
-def _or_none(value):
-    return value if math.isfinite(value) else None      # JSON knows no NaN
+def _or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None      # JSON has no NaN

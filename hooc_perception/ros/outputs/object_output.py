@@ -1,12 +1,16 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The topics objects/* and scene/*: the answer, for programs and for viewers."""
+"""The topics objects/* and scene/*: the result, for programs and viewers."""
 
+from collections.abc import Sequence
 import colorsys
 import json
 
-from geometry_msgs.msg import PoseArray
+from geometry_msgs.msg import Pose, PoseArray
 from hooc_perception.chain import topic_token
+from hooc_perception.core.arrays import AnyArray
+from hooc_perception.core.types import Candidates, GenericModel, ParsedScene
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, pose_array_message
 from hooc_perception.ros.messages.point_clouds import cloud_message, row_dtype
 from hooc_perception.ros.messages.stages import (
@@ -17,22 +21,23 @@ from hooc_perception.ros.messages.stages import (
 )
 import numpy as np
 from sensor_msgs.msg import PointCloud2
-from std_msgs.msg import String
+from std_msgs.msg import Header, String
 from visualization_msgs.msg import Marker, MarkerArray
 
 
 class ObjectOutput:
     """
-    Publish answers.
+    Publish results.
 
-    :param models: tuple of GenericModel; class id c is models[c - 1].
-    :param meshes: one (URI, sha256 in hex) a model.
+    :param models: class id c is models[c - 1].
+    :param meshes: one (URI, sha256 in hex) per model.
     """
 
-    def __init__(self, node, models, meshes):
-        """Create the publishers on a StageNode."""
+    def __init__(self, node: StageNode, models: Sequence[GenericModel],
+                 meshes: Sequence[tuple[str, str]]) -> None:
+        """Create the publishers."""
         self.models, self.meshes = models, meshes
-        self._shown = set()
+        self._shown: set[tuple[str, int]] = set()   # (ns, id) of the markers in viewers
         self._poses = node.publisher(PoseArray, 'objects/poses')
         self._attributes = node.publisher(PointCloud2, 'objects/attributes')
         self._labels = node.publisher(String, 'objects/labels')
@@ -43,17 +48,18 @@ class ObjectOutput:
         self._unexplained = node.publisher(PointCloud2, 'scene/unexplained')
         self._summary = node.publisher(String, 'scene/summary')
 
-    def announce(self):
-        """Latch what the class ids mean, before there is any answer."""
+    def announce(self) -> None:
+        """Latch the meaning of the class ids before the first result."""
         self._labels.publish(String(data=labels_json(self.models, self.meshes)))
 
-    def publish(self, parsed, ids, stamp_ns, frame, age_s, unexplained):
+    def publish(self, parsed: ParsedScene, ids: AnyArray, stamp_ns: int, frame: str,
+                age_s: float, unexplained: AnyArray) -> None:
         """
-        Publish one answer; `objects/poses` goes last, so that whoever waits for it has all.
+        Publish one result; `objects/poses` goes last: once it has arrived, so has the rest.
 
         :param ids: (n,) uint32 instance ids.
         :param age_s: seconds since the stamp.
-        :param unexplained: (n, 3) world points.
+        :param unexplained: (m, 3) world points.
         """
         head, found = header(stamp_ns, frame), parsed.objects
         poses, attributes = objects_messages(parsed, ids, age_s, head)
@@ -63,62 +69,67 @@ class ObjectOutput:
         for class_id, publisher in enumerate(self._by_category, 1):
             mine = found.take(found.category == class_id)
             publisher.publish(pose_array_message(mine.translation, mine.rotation_xyzw, head))
-        self._markers.publish(self._markers_message(poses, found, ids, head))
+        self._markers.publish(self._markers_message(list(poses.poses), found, ids, head))
         self._unexplained.publish(points_message(unexplained, head))
         self._summary.publish(String(data=summary_json(parsed, stamp_ns)))
         self._poses.publish(poses)
 
-    def clear(self, stamp_ns, frame):
-        """Take the last answer back: empty messages on every topic, no markers."""
+    def clear(self, stamp_ns: int, frame: str) -> None:
+        """Retract the last result: empty messages on every topic, no markers."""
         head = header(stamp_ns, frame)
         attributes, unexplained = empty_clouds(head)
         self._labels.publish(String(data=labels_json(self.models, self.meshes)))
         self._attributes.publish(attributes)
         for publisher in self._by_category:
             publisher.publish(PoseArray(header=head))
-        # What a predecessor that died has left in a viewer goes with DELETEALL.
+        # DELETEALL also removes the markers of a predecessor that died.
         self._markers.publish(MarkerArray(markers=[
             *self._deleted(set(), head), Marker(header=head, action=Marker.DELETEALL)]))
         self._unexplained.publish(unexplained)
         self._summary.publish(String(data=summary_json(None, stamp_ns)))
         self._poses.publish(PoseArray(header=head))
 
-    def _deleted(self, now, head):
+    def _deleted(self, now: set[tuple[str, int]], head: Header) -> list[Marker]:
         """Return a DELETE for each (ns, id) that was shown and is not in `now`; remember `now`."""
         gone, self._shown = sorted(self._shown - now), now
         return [Marker(header=head, ns=ns, id=number, action=Marker.DELETE) for ns, number in gone]
 
-    def _markers_message(self, poses, found, ids, head):
-        """Return DELETE for what was shown and is gone, ADD for what stands there now."""
+    def _markers_message(self, poses: Sequence[Pose], found: Candidates, ids: AnyArray,
+                         head: Header) -> MarkerArray:
+        """Return DELETE for the markers of objects that are gone, ADD for the current ones."""
         markers = self._deleted({(self.models[c - 1].name, int(number))
                                  for c, number in zip(found.category, ids)}, head)
         for i, number in enumerate(ids):
             class_id = int(found.category[i])
             model = self.models[class_id - 1]
             marker = Marker(header=head, ns=model.name, id=int(number), action=Marker.ADD,
-                            type=Marker.MESH_RESOURCE, pose=poses.poses[i],
+                            type=Marker.MESH_RESOURCE, pose=poses[i],
                             mesh_resource=self.meshes[class_id - 1][0])
             scale = found.size[i] / model.extents
             marker.scale.x, marker.scale.y, marker.scale.z = (float(s) for s in scale)
-            hue = class_id * 0.618034 % 1.0     # golden ratio: neighbours differ
+            hue = class_id * 0.618034 % 1.0     # golden ratio: adjacent ids differ
             marker.color.r, marker.color.g, marker.color.b = colorsys.hsv_to_rgb(hue, 0.6, 0.95)
             marker.color.a = 0.8
             markers.append(marker)
         return MarkerArray(markers=markers)
 
 
-def empty_clouds(head):
-    """Return `objects/attributes` and `scene/unexplained` where nothing is known to stand."""
+def empty_clouds(head: Header) -> tuple[PointCloud2, PointCloud2]:
+    """Return empty `objects/attributes` and `scene/unexplained`."""
     return (cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head),
             points_message(np.zeros((0, 3)), head))
 
 
-def summary_json(parsed, stamp_ns):
-    """Return the text of `scene/summary`: how the answer came about; None: there is no answer."""
-    energy = {name: parsed and float(getattr(parsed.energy, name))
-              for name in ('total', 'depth', 'probability', 'overlap')}
-    return json.dumps({
-        'format': 'hooc-summary/1', 'stamp_ns': stamp_ns, 'energy': energy,
-        'converged': bool(parsed and parsed.converged),
-        'candidates': len(parsed.pool) if parsed else 0,
-        'seconds': {name: float(s) for name, s in parsed.seconds.items()} if parsed else {}})
+def summary_json(parsed: ParsedScene | None, stamp_ns: int) -> str:
+    """Return the text of `scene/summary`: statistics of a result; None = it is retracted."""
+    summary = {'format': 'hooc-summary/1', 'stamp_ns': stamp_ns,
+               'energy': dict.fromkeys(('total', 'depth', 'probability', 'overlap')),
+               'converged': False, 'candidates': 0, 'seconds': {}}
+    if parsed is not None:
+        energy = parsed.energy
+        summary.update(
+            energy={'total': float(energy.total), 'depth': float(energy.depth),
+                    'probability': float(energy.probability), 'overlap': float(energy.overlap)},
+            converged=bool(parsed.converged), candidates=len(parsed.pool),
+            seconds={name: float(s) for name, s in parsed.seconds.items()})
+    return json.dumps(summary)

@@ -1,63 +1,79 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""When each recorded image is due, and with which stamp: pure, so that it can be tested."""
+"""When each recorded image is due, and with which stamp; independent of ROS."""
 
 from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 from hooc_perception.core.config import Config, param
+
+# (camera, recorded stamp in ns, message)
+RecordedImage: TypeAlias = tuple[str, int, Any]
 
 
 @dataclass(frozen=True)
 class Due:
-    """One image to publish: of which camera, its message, the stamp to give it."""
+    """
+    One image to publish.
+
+    :ivar stamp_ns: the stamp to publish it with.
+    """
 
     camera: str
     stamp_ns: int
-    message: object
+    message: Any
 
 
 @dataclass(frozen=True)
 class PlayerConfig(Config):
-    """How recorded images are paced."""
+    """Parameters of the playback."""
 
-    rate: float = param(1.0, 'Speed: 1 as recorded; 0 sends a frame set when the last one is '
-                        'answered on objects/poses, as fast as the chain takes them.', '', 0.0,
-                        100.0)
+    rate: float = param(1.0, 'Speed relative to the recording; 0 = send each frame set when the '
+                        'last one is answered on objects/poses, as fast as the chain processes '
+                        'them.', '', 0.0, 100.0)
     loop: bool = param(False, 'Start again at the end, one mean frame period after the last image '
-                       '(a bag of one frame set: one second).')
-    restamp: bool = param(True, 'Give the images stamps of now, with the recorded distances (by '
-                          'rate); without, the recorded ones.')
-    min_gap_s: float = param(0.005, 'Least time between two images: large messages sent back to '
-                             'back are what gets lost.', 's', 0.0, 1.0)
+                       '(after one second if the bag holds a single frame set).')
+    restamp: bool = param(True, 'Stamp the images with the current time and keep the recorded '
+                          'intervals (divided by rate); false keeps the recorded stamps.')
+    min_gap_s: float = param(0.005, 'Minimum time between two images: large messages that are '
+                             'sent back to back may get lost.', 's', 0.0, 1.0)
 
 
 class Player:
     """
-    Pace recorded images like live cameras.
+    Pace recorded images like those of live cameras.
 
-    :param images: callable that returns a fresh iterator of (camera, stamp_ns, message) in
-        the order of time.
+    :param images: returns a new iterator over the images, in the order of time.
+    :ivar set_stamp_ns: stamp of the first image of the latest frame set (rate 0).
+    :ivar published: number of images that were due so far.
     """
 
-    def __init__(self, images, config=PlayerConfig()):
+    def __init__(self, images: Callable[[], Iterator[RecordedImage]],
+                 config: PlayerConfig = PlayerConfig()) -> None:
         """Start with the first image at the first call of `due`."""
         self._images, self.rate, self.restamp = images, config.rate, config.restamp
         self.loop, self._min_gap_ns = config.loop, round(config.min_gap_s * 1e9)
-        self._iterator, self._next = iter(images()), None
-        # Of this pass: node time and recorded stamp of the first image, images a camera.
-        self._start, self._first, self._sent = None, None, Counter()
-        self._not_before = 0                # node time
-        self._last_time = None
-        self._in_set = set()                # cameras sent since the last release
-        self.set_stamp_ns = 0               # given to the first image of the latest set
+        self._iterator = iter(images())
+        self._next = next(self._iterator, None)
+        # Of this pass: node time and recorded stamp of the first image, images per camera.
+        self._start: int | None = None
+        self._first, self._sent = 0, Counter[str]()
+        self._not_before = 0                        # node time
+        self._last_time: int | None = None
+        self._in_set: set[str] = set()              # cameras sent since the last release
         self._held = False
-        self.finished, self.published = False, 0
-        self._advance()
+        self.set_stamp_ns = self.published = 0
 
-    def due(self, now_ns):
-        """Return the Due image, or None while there is none; call often."""
-        if self.finished or self._held:
+    @property
+    def finished(self) -> bool:
+        """Return whether all images were due."""
+        return self._next is None
+
+    def due(self, now_ns: int) -> Due | None:
+        """Return the image that is due at a node time, or None; call it often."""
+        if self._next is None or self._held:
             return None
         if self._last_time is not None and now_ns - self._last_time < self._min_gap_ns:
             return None
@@ -73,7 +89,7 @@ class Player:
             if camera in self._in_set:
                 self._held = True
                 return None
-            # Distances as recorded from the set's first image on.
+            # Intervals as recorded, from the first image of the set on.
             if not self._in_set:
                 self._start, self._first, when = now_ns, stamp, now_ns
                 self.set_stamp_ns = when if self.restamp else stamp
@@ -84,19 +100,19 @@ class Player:
         return Due(camera, when if self.restamp else stamp, message)
 
     @property
-    def waits_for_release(self):
-        """Return whether a whole set is out and `released()` is awaited (rate 0)."""
+    def waits_for_release(self) -> bool:
+        """Return whether a complete set was sent and `released()` must be called (rate 0)."""
         return self._held
 
-    def released(self):
-        """Let the next frame set go (rate 0)."""
+    def released(self) -> None:
+        """Allow the next frame set (rate 0)."""
         self._held = False
         self._in_set.clear()
 
-    def _advance(self, stamp=None, when=None):
-        """Read the next image; `stamp` and `when` are those of the last one."""
+    def _advance(self, stamp: int, when: int) -> None:
+        """Read the next image; `stamp` and `when` (recorded, node time) are of the last one."""
         self._next = next(self._iterator, None)
-        if self._next is None and self.loop and self.published:
+        if self._next is None and self.loop:
             self._iterator = iter(self._images())
             self._next = next(self._iterator)
             images = max(self._sent.values())
@@ -104,4 +120,3 @@ class Player:
             self._not_before = when + round(period_ns / (self.rate or 1.0))
             self._start = None
             self._sent.clear()
-        self.finished = self._next is None

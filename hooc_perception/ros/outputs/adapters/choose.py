@@ -1,35 +1,49 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which adapters a node's parameters ask for."""
+"""Which adapters the parameters of a node ask for, and how they are called."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any, Protocol
 
 from hooc_perception.core.config import Config, param
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.outputs.adapters.detections import Detections
 from hooc_perception.ros.outputs.adapters.object_frames import ObjectFrames
 from hooc_perception.ros.outputs.adapters.planning_scene import PlanningSceneDiffs
+from hooc_perception.ros.outputs.detected import DetectedScene
+
+
+class Adapter(Protocol):
+    """An output in the messages of another package."""
+
+    def publish(self, scene: DetectedScene) -> None:
+        """Publish a result."""
+
+    def clear(self, stamp_ns: int, frame: str) -> None:
+        """Retract the last result."""
 
 
 @dataclass(frozen=True)
 class AdapterConfig(Config):
-    """Parameters of the adapters; all are off by default."""
+    """Parameters of the adapters; all of them are off by default."""
 
-    publish_tf: bool = param(False, 'Send a frame `<category>_<id>` of every object on /tf; needs '
+    publish_tf: bool = param(False, 'Publish a frame `<category>_<id>` per object on /tf; needs '
                              'tf2_msgs.')
     publish_detections: bool = param(False, 'Publish objects/detections; needs vision_msgs.')
     planning_scene: str = param('off', 'Keep the objects in the planning scene of MoveIt, as '
-                                'their meshes or as boxes around them; needs moveit_msgs.',
+                                'their meshes or as their bounding boxes; needs moveit_msgs.',
                                 choices=('off', 'mesh', 'box'))
     planning_scene_ttl_s: float = param(
-        10.0, 'An object that no answer has shown for so long is taken out of the planning '
-        'scene; 0: as soon as an answer does not show it.', 's', 0.0, 3600.0, runtime=True)
+        10.0, 'An object that is missing from the results for this long is removed from the '
+        'planning scene; 0 = at once.', 's', 0.0, 3600.0, runtime=True)
 
 
-def adapters_of(node):
+def adapters_of(node: StageNode) -> list[Adapter]:
     """
-    Return the adapters that the config of a StageNode asks for.
+    Return the adapters that the config of a node, an AdapterConfig, asks for.
 
-    :raises HoocError: where one is asked for whose message package is not installed.
+    :raises HoocError: if the message package of one of them is not installed.
     """
     config, chosen = node.config, []
     if config.publish_tf:
@@ -41,13 +55,25 @@ def adapters_of(node):
     return chosen
 
 
-def tell(node, adapters, what, *args):
-    """
-    Have adapters `publish` or `clear`; what fails costs neither the other ones nor the answer.
-
-    :param what: name of the method; `args` go to it.
-    """
+def publish_all(node: StageNode, adapters: Sequence[Adapter], scene: DetectedScene) -> None:
+    """Publish a result with each adapter; an error of one affects nothing else."""
     for adapter in adapters:
-        thing = type(adapter).__name__
-        if node.guarded(getattr(adapter, what), thing, f'its {what} is left out')(*args):
-            node.diagnostics.ok(thing)
+        _guarded(node, adapter, 'publish', lambda a=adapter: a.publish(scene))
+
+
+def clear_all(node: StageNode, adapters: Sequence[Adapter], stamp_ns: int, frame: str) -> None:
+    """Retract the last result with each adapter; an error of one affects nothing else."""
+    for adapter in adapters:
+        _guarded(node, adapter, 'clear', lambda a=adapter: a.clear(stamp_ns, frame))
+
+
+def _guarded(node: StageNode, adapter: Adapter, what: str, call: Callable[[], None]) -> None:
+    """Report in /diagnostics whether a call went well, under the name of the adapter."""
+    name = type(adapter).__name__
+    if node.guarded(call, name, f'its {what} is skipped')():
+        node.diagnostics.ok(name)
+
+
+def tell(node: StageNode, adapters: Sequence[Adapter], what: str, *args: Any) -> None:
+    """Call `publish_all` or `clear_all` by name."""
+    {'publish': publish_all, 'clear': clear_all}[what](node, adapters, *args)

@@ -1,18 +1,19 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Import message packages that only ROS installations have."""
+"""Import message packages that only some ROS installations have."""
 
 import importlib
+from typing import Any
 
 from hooc_perception.errors import HoocError
 
 
-def messages_of(package, parameter):
+def messages_of(package: str, parameter: str) -> Any:
     """
     Return the module `package`.msg.
 
-    :param parameter: the parameter that asks for it, for the complaint.
-    :raises HoocError: where it is not installed.
+    :param parameter: the parameter that requires it, for the error message.
+    :raises HoocError: if it is not installed.
     """
     try:
         return importlib.import_module(f'{package}.msg')

@@ -1,41 +1,48 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""MoveIt: the objects as collision objects of the planning scene, as long as they are there."""
+"""The objects as collision objects in the planning scene of MoveIt."""
+
+from collections.abc import Sequence
+from typing import Any
 
 from geometry_msgs.msg import Point, Pose
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, pose_message
 from hooc_perception.ros.outputs.adapters.guard import messages_of
+from hooc_perception.ros.outputs.detected import DetectedObject, DetectedScene
 import numpy as np
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
+from std_msgs.msg import Header
 
 CHECK_S = 0.5
 
 
 class PlanningSceneDiffs:
     """
-    Publish diffs on /planning_scene: ADD for what is there, REMOVE for what is gone.
+    Publish diffs on /planning_scene: ADD for detected objects, REMOVE for those that are gone.
 
-    What an answer does not show may only be hidden, perhaps by the robot: it stays for
-    `planning_scene_ttl_s`. Where no answers come at all, everything goes after that time.
+    An object that is missing from a result may be hidden, perhaps by the robot: it stays for
+    `planning_scene_ttl_s`. Without any results, all objects are removed after that time.
 
     :param shape: 'mesh' or 'box'.
     """
 
-    def __init__(self, node, shape):
-        """Create the publisher on a StageNode; HoocError without moveit_msgs."""
+    def __init__(self, node: StageNode, shape: str) -> None:
+        """Create the publisher; HoocError without moveit_msgs."""
         self._node, self._shape = node, shape
         self._messages = messages_of('moveit_msgs', 'planning_scene')
         self._publisher = node.publisher(self._messages.PlanningScene, '/planning_scene')
-        self._seen = {}     # name -> node time (ns) of the last answer that shows it
-        self._frame, self._stamp_ns = node.config.target_frame, 0   # of the last answer
+        # Name -> node time (ns) of the last result with the object.
+        self._seen: dict[str, int] = {}
+        self._frame, self._stamp_ns = '', 0     # of the last result
         node.owned(node.destroy_timer, node.create_timer(CHECK_S, node.guarded(
-            self.expire, type(self).__name__, 'what is gone stays in the planning scene')))
+            self.expire, type(self).__name__, 'objects that are gone stay in the planning scene')))
 
-    def publish(self, scene):
-        """Add or replace the objects of a DetectedScene and remove those whose time is over."""
+    def publish(self, scene: DetectedScene) -> None:
+        """Add or replace the objects of a result and remove those that have expired."""
         now, self._frame = self._node.now_ns(), scene.frame
         shown = {o.name: now for o in scene.objects}
-        # Time was set back (a looped bag): ids begin anew, and those of before never come again.
+        # Time was set back (a looped bag): ids start over, and the earlier ones never return.
         gone = [] if scene.stamp_ns >= self._stamp_ns else sorted(set(self._seen) - set(shown))
         self._seen = {name: t for name, t in self._seen.items() if name not in gone} | shown
         self._stamp_ns = scene.stamp_ns
@@ -43,51 +50,54 @@ class PlanningSceneDiffs:
                  for o in scene.objects]
         self._send(added, gone + self._expired(now), scene.header)
 
-    def expire(self):
-        """Remove what no answer has shown for too long."""
+    def expire(self) -> None:
+        """Remove the objects that have expired."""
         if self._node.active:
             now = self._node.now_ns()
             self._send([], self._expired(now), header(now, self._frame))
 
-    def clear(self, stamp_ns, frame):
-        """Remove all that was added."""
+    def clear(self, stamp_ns: int, frame: str) -> None:
+        """Remove all objects."""
         names, self._seen = list(self._seen), {}
         self._send([], names, header(stamp_ns, frame))
 
-    def _expired(self, now):
-        """Return and forget the names of the objects whose time is over."""
+    def _expired(self, now: int) -> list[str]:
+        """Return and forget the names of the objects that have been missing for too long."""
         ttl_ns = self._node.config.planning_scene_ttl_s * 1e9
-        # A clock that was set back would keep everything for ever: that is over, too.
+        # After a clock was set back, ages are negative: these have expired, too.
         names = [name for name, seen in self._seen.items() if not 0 <= now - seen <= ttl_ns]
         for name in names:
             del self._seen[name]
         return names
 
-    def _send(self, added, removed, head):
+    def _send(self, added: Sequence[Any], removed: Sequence[str], head: Header) -> None:
         if added or removed:
             self._publisher.publish(diff_message(added, removed, head, self._messages))
 
 
-def diff_message(added, removed, head, messages):
+def diff_message(added: Sequence[Any], removed: Sequence[str], head: Header,
+                 messages: Any) -> Any:
     """
     Return the PlanningScene diff that adds CollisionObjects and removes others.
 
-    :param removed: names.
+    :param removed: names of objects.
+    :param messages: the module moveit_msgs.msg.
     """
     kind = messages.CollisionObject
     scene = messages.PlanningScene(is_diff=True)
-    # Without this, MoveIt would take the empty robot state for the robot's.
+    # Otherwise MoveIt would apply the empty robot state.
     scene.robot_state.is_diff = True
     scene.world.collision_objects = [
-        kind(header=head, id=name, operation=kind.REMOVE) for name in removed] + added
+        kind(header=head, id=name, operation=kind.REMOVE) for name in removed] + [*added]
     return scene
 
 
-def collision_object(found, head, shape, messages):
+def collision_object(found: DetectedObject, head: Header, shape: str, messages: Any) -> Any:
     """
-    Return the CollisionObject of a DetectedObject; its id is the object's name, as teacup_7.
+    Return the CollisionObject of a DetectedObject; its id is the name, such as teacup_7.
 
-    :param shape: 'mesh': the scaled generic model; 'box': its bounding box.
+    :param shape: 'mesh' = the scaled generic model, 'box' = its bounding box.
+    :param messages: the module moveit_msgs.msg.
     """
     kind = messages.CollisionObject
     out = kind(header=head, id=found.name, operation=kind.ADD,

@@ -61,7 +61,7 @@ def test_who_is_missing_is_named_and_the_node_stays_inactive(bench, listener, mo
     assert node.trigger_activate() == FAILURE
     code, sentence = bench.reasons(node)['node']
     assert code == 'activate_failed' and not node.active
-    assert sentence.startswith(f'parsing_node did not come to listen to {TOPIC} within 0.3 s')
+    assert sentence.startswith(f'parsing_node did not subscribe to {TOPIC} within 0.3 s')
     listener('parsing_node')
     assert node.trigger_activate() == SUCCESS
 

@@ -13,7 +13,7 @@ from hooc_perception.chain import PROFILES
 from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.health.diagnostics import Diagnostics, WARN
-from hooc_perception.ros.health.downstream import wait_for_workers
+from hooc_perception.ros.health.downstream import wait_for_consumers
 from hooc_perception.ros.lifecycle.memory import give_back_memory
 from hooc_perception.ros.lifecycle.misaddressed import inert, misaddressed
 from hooc_perception.ros.lifecycle.parameters import fixed_param, Parameters
@@ -192,7 +192,7 @@ class StageNode(TolerantLifecycleNode):
             self.since = time.monotonic()
             LifecycleNode.on_activate(self, state)
             if getattr(self.config, 'wait_for_stages', False):
-                wait_for_workers(self, self._topics)
+                wait_for_consumers(self, self._topics)
             self.activate()
             self.active = True
             self.diagnostics.state('node', 'ok', 'ok')

@@ -19,15 +19,15 @@ FAST_DDS_VARIABLES = ('FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILE
 TRANSPORTS_VARIABLE = 'FASTDDS_BUILTIN_TRANSPORTS'
 SHARED_MEMORY = Path('/dev/shm')
 SEGMENT_BYTES = 64 * 2 ** 20
-# Domains above would use ports that the system gives to outgoing connections.
+# Higher domains use ports that the system may assign to outgoing connections.
 DOMAINS = range(1, 102)
 
 
-def full_namespace(text):
+def full_namespace(text: str) -> str:
     """
-    Return a namespace with its slash, as the nodes have it.
+    Return a namespace with its slash, as nodes have it.
 
-    :raises HoocError: where ROS takes no such namespace.
+    :raises HoocError: if the namespace is not valid in ROS.
     """
     namespace = '/' + text.strip('/')
     try:
@@ -38,20 +38,19 @@ def full_namespace(text):
     return namespace
 
 
-def claim_domain():
+def claim_domain() -> tuple[int, socket.socket]:
     """
     Return (domain id, claim) of a ROS domain that no other run on this machine uses.
 
-    The claim is a socket: keep it while the domain is in use; the system frees it even if
+    The claim is a socket: keep it as long as the domain is in use. The system frees it even if
     this process is killed.
 
-    :raises HoocError: where all of them are taken.
+    :raises HoocError: if all of them are taken.
     """
     if sys.platform != 'linux':
         return random.choice(DOMAINS), socket.socket()
     for domain in random.sample(DOMAINS, len(DOMAINS)):
-        # An abstract address: no file to leave behind, and as private as the network that
-        # the domain lives in.
+        # An abstract address: it leaves no file behind, and is local to the network namespace.
         claim = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
             claim.bind(f'\0hooc_perception.domain.{domain}')
@@ -62,11 +61,11 @@ def claim_domain():
                     'some, or set ROS_DOMAIN_ID')
 
 
-def isolate():
+def isolate() -> socket.socket | None:
     """
-    Keep this process and its children apart from all other ROS traffic; return the claim.
+    Separate this process and its children from all other ROS traffic; return the claim.
 
-    What the user has set (ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE) is respected.
+    Settings of the user (ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE) are respected.
     """
     os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
     if os.environ.get('ROS_DOMAIN_ID'):
@@ -76,15 +75,14 @@ def isolate():
     return claim
 
 
-def use_large_segments(processes=8):
+def use_large_segments(processes: int = 8) -> bool:
     """
-    Have Fast DDS use shared-memory segments that hold several images, where there is room.
+    Make Fast DDS use shared-memory segments that hold several images, if there is room.
 
     :param processes: how many such segments there will be.
-    :return: whether the profile is in use. Not where the user has one of their own or has
-        chosen transports by FASTDDS_BUILTIN_TRANSPORTS, nor where shared memory is too small
-        (containers often have 64 MB): writing to a segment without room behind it would kill
-        the process.
+    :return: whether the profile is used. It is not if the user has a profile or has chosen
+        transports by FASTDDS_BUILTIN_TRANSPORTS, or if shared memory is too small (containers
+        often have 64 MB): writing to a segment without memory behind it kills the process.
     """
     if any(os.environ.get(name) for name in (*FAST_DDS_VARIABLES, TRANSPORTS_VARIABLE)):
         return False
@@ -95,8 +93,8 @@ def use_large_segments(processes=8):
     return True
 
 
-def child_environment():
-    """Return the environment of a node's process."""
+def child_environment() -> dict[str, str]:
+    """Return the environment of the process of a node."""
     package_root = str(Path(__file__).resolve().parents[2])
     paths = [package_root, *filter(None, os.environ.get('PYTHONPATH', '').split(os.pathsep))]
     return {**os.environ, 'PYTHONPATH': os.pathsep.join(dict.fromkeys(paths)),

@@ -1,23 +1,26 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""A user's file of parameters: which of its sections reach no node, and what wins over it."""
+"""The parameter file of a user: sections that reach no node, and values that override it."""
 
+from collections.abc import Iterator, Mapping, Sequence
 import difflib
 import json
+from pathlib import Path
 import re
 import tempfile
+from typing import Any, IO
 
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import files
 
 
-def unreached_sections(path, names, namespace):
+def unreached_sections(path: Path, names: Sequence[str], namespace: str) -> list[str]:
     """
-    Return one sentence for each section of a ROS parameter file that no node takes.
+    Return one sentence per section of a ROS parameter file that applies to no node.
 
     :param names: of the nodes that are started.
-    :param namespace: that they are in.
-    :raises HoocError: where the file is no YAML.
+    :param namespace: of the nodes.
+    :raises HoocError: if the file is not YAML.
     """
     content = files.read_yaml(path)
     nodes = [f'{namespace.rstrip("/")}/{name}' for name in names]
@@ -28,30 +31,31 @@ def unreached_sections(path, names, namespace):
         last = section.rpartition('/')[2]
         near = difflib.get_close_matches(last, names, 1, 0.5)
         sentences.append(
-            f'{path}: the section {section!r} reaches no node'
-            + (f'; write /**/{near[0]}' if near else f'; there are {", ".join(nodes)}'))
+            f'{path}: the section {section!r} applies to no node'
+            + (f'; write /**/{near[0]}' if near else f'; the nodes are {", ".join(nodes)}'))
     return sentences
 
 
-def open_last_file(parameters, node, params_file=None, defaults=None):
+def open_last_file(parameters: Mapping[str, Any], node: str, params_file: Path | None = None,
+                   defaults: Mapping[str, Any] | None = None) -> IO[str]:
     """
-    Return an open temporary file of parameters that win over those of `params_file`.
+    Return an open temporary file of parameters that override those of `params_file`.
 
-    Where several sections are meant for a node, rcl lets the one win that was first named last,
-    whatever the order of files and `-p` (which is the section `/**`); within one section, the
-    latest file wins. So the values stand in all sections of the user's file: only the process
-    that is given this file reads it. It has no name and is gone when it is closed, however this
-    process ends.
+    If several sections apply to a node, rcl prefers the one whose first mention comes last,
+    regardless of the order of files and of `-p` (which is the section `/**`); within one
+    section, the last file wins. Therefore the values stand in all sections of the user's file;
+    only the process that gets this file reads it. It has no name and disappears when it is
+    closed, however this process ends.
 
-    :param parameters: {name: value}; empty lists, which ROS cannot write, and None are left out.
+    :param parameters: {name: value}; None and empty lists, which ROS cannot express, are
+        omitted.
     :param node: full name of the node.
-    :param defaults: {name: value} of what holds unless the user's file or `parameters` says
-        otherwise.
+    :param defaults: {name: value} for what neither `parameters` nor the user's file set.
     """
     try:
         content = files.read_yaml(params_file) if params_file else {}
     except HoocError:
-        content = {}    # changed since the start: the node itself will say what is wrong
+        content = {}    # it changed since the start: the node itself reports the problem
     sections = dict(_sections(content))
     set_by_user = {name for section, values in sections.items() if _reaches(section, node)
                    for name in (values if isinstance(values, dict) else ())}
@@ -59,15 +63,15 @@ def open_last_file(parameters, node, params_file=None, defaults=None):
     values.update((name, value) for name, value in parameters.items()
                   if value is not None and value not in ((), []))
     file = tempfile.TemporaryFile('w', encoding='utf-8')
-    # JSON is YAML that leaves no doubt about types.
+    # JSON is YAML with unambiguous types.
     json.dump({section: {'ros__parameters': values} for section in (*sections, node)}, file,
               ensure_ascii=False)
     file.flush()
     return file
 
 
-def _sections(content, prefix=''):
-    """Yield (name, parameters) of all nodes that a file is for; namespaces may be nested."""
+def _sections(content: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[str, Any]]:
+    """Yield (name, parameters) of each section of a file; namespaces may be nested."""
     for key, value in content.items():
         name = f'{prefix}/{key}' if prefix else str(key)
         if not isinstance(value, dict):
@@ -77,8 +81,8 @@ def _sections(content, prefix=''):
         yield from _sections({k: v for k, v in value.items() if k != 'ros__parameters'}, name)
 
 
-def _reaches(section, node):
-    """Return whether a node's full name is meant by a section: ** any tokens, * one of them."""
+def _reaches(section: str, node: str) -> bool:
+    """Return whether a section applies to the full name of a node: ** any tokens, * one token."""
     pattern = section if section.startswith('/') else f'/{section}'
     expression = re.escape(pattern).replace(r'/\*\*', '(/.*)?').replace(r'\*', '[^/]+')
     return re.fullmatch(expression, node) is not None

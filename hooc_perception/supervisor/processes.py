@@ -1,14 +1,17 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""A node as a process: start it, pass on what it says, notice its end, end it."""
+"""A node as a process: start it, forward its output, detect its end, end it."""
 
 from collections import deque
+from collections.abc import Mapping
+from pathlib import Path
 import re
 import signal
 import subprocess
 import sys
 import threading
 import time
+from typing import Any
 
 from hooc_perception.supervisor.environment import child_environment
 from hooc_perception.supervisor.params_file import open_last_file
@@ -18,33 +21,34 @@ _QUIET, _LOUD = ('[INFO]', '[DEBUG]'), ('[WARN]', '[ERROR]', '[FATAL]')
 
 class NodeProcess:
     """
-    One node in a process and a process group of its own.
+    One node in a process and process group of its own.
 
-    :ivar name: of the node, which is also that of its module in hooc_perception.nodes.
+    :ivar name: of the node and of its module in hooc_perception.nodes.
     """
 
-    def __init__(self, name, parameters, namespace, params_file=None,
-                 verbose=False, module=None, defaults=None):
+    def __init__(self, name: str, parameters: Mapping[str, Any], namespace: str,
+                 params_file: Path | None = None, verbose: bool = False,
+                 module: str | None = None, defaults: Mapping[str, Any] | None = None) -> None:
         """
         Start the process.
 
         :param parameters: {name: value}; empty lists and None are left at their defaults.
-        :param params_file: YAML of the user; `parameters` win over it.
-        :param verbose: pass on everything; else only warnings and errors.
+        :param params_file: YAML of the user; `parameters` take precedence.
+        :param verbose: forward all output, not only warnings and errors.
         :param module: another module to run, in tests.
-        :param defaults: {name: value} that hold where neither the file nor `parameters` say
-            otherwise.
+        :param defaults: {name: value} for what neither `parameters` nor the file set.
         """
         self.name, self._verbose = name, verbose
-        self._lines, self._stopping = deque(maxlen=40), False
+        self._lines: deque[str] = deque(maxlen=40)
+        self._stopping = False
         node = f'{namespace.rstrip("/")}/{name}'
-        # A group of its own: Ctrl-C reaches the supervisor only, which ends the nodes in order.
+        # A group of its own: Ctrl-C only reaches the supervisor, which ends the nodes in order.
         with open_last_file(parameters, node, params_file, defaults) as last:
             paths = [*([params_file] if params_file else []), f'/dev/fd/{last.fileno()}']
             self._process = subprocess.Popen(
                 [sys.executable, '-m', module or f'hooc_perception.nodes.{name}', '--ros-args',
                  '-r', f'__ns:={namespace}',
-                 # What they say comes through the pipe; no files in the home directory as well.
+                 # The log comes through the pipe; log files are not needed.
                  '--disable-external-lib-logs',
                  *(word for path in paths for word in ('--params-file', str(path)))],
                 env=child_environment(), stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
@@ -54,50 +58,53 @@ class NodeProcess:
         self._reader.start()
 
     @property
-    def pid(self):
+    def pid(self) -> int:
         """Return the process id."""
         return self._process.pid
 
-    def exit_code(self):
+    def exit_code(self) -> int | None:
         """Return the exit code, None while it runs."""
         return self._process.poll()
 
-    def manner_of_death(self):
-        """Return in words how a process that has ended did so."""
+    def manner_of_death(self) -> str:
+        """Return in words how the process ended."""
         code = self.exit_code()
+        if code is None:
+            return 'still running'
         if code >= 0:
             return f'exit code {code}'
         try:
             name = signal.Signals(-code).name
         except ValueError:
             name = f'signal {-code}'
-        return f'killed by {name}' + ('; was memory short?' if -code == signal.SIGKILL else '')
+        return f'killed by {name}' + (
+            '; possibly out of memory' if -code == signal.SIGKILL else '')
 
-    def last_words(self):
-        """Return the last error that it printed, or its last line."""
+    def last_words(self) -> str:
+        """Return the last error that it printed, or else its last line."""
         self._reader.join(0.5 if self.exit_code() is not None else 0)
         lines = [line for line in self._lines if line]
         errors = [line for line in lines if line.startswith(('[ERROR]', '[FATAL]'))]
-        return re.sub(r'^\[(ERROR|FATAL)\] ', '', (errors or lines or ['it said nothing'])[-1])
+        return re.sub(r'^\[(ERROR|FATAL)\] ', '', (errors or lines or ['it printed nothing'])[-1])
 
-    def ask_to_stop(self):
+    def ask_to_stop(self) -> None:
         """
-        Send SIGTERM, which `run_node` turns into an orderly end.
+        Send SIGTERM, on which `run_node` shuts down in order.
 
-        Not SIGINT: a process that is still importing would print a trace.
+        Not SIGINT: a process that is still importing would print a traceback.
         """
         self._stopping = True
         self._signal(signal.SIGTERM)
 
-    def kill(self):
+    def kill(self) -> None:
         """End it at once; the watchdog notices."""
         self._signal(signal.SIGKILL)
 
-    def stop(self, deadline):
+    def stop(self, deadline: float) -> None:
         """
-        Make sure that it has ended.
+        Wait for the end of the process, and kill it after a deadline.
 
-        :param deadline: time.monotonic() until which it may take its time.
+        :param deadline: time.monotonic().
         """
         try:
             self._process.wait(max(0.0, deadline - time.monotonic()))
@@ -106,15 +113,16 @@ class NodeProcess:
             self._process.wait(5)
         self._reader.join(1)
 
-    def _signal(self, number):
+    def _signal(self, number: signal.Signals) -> None:
         if self._process.poll() is None:
             self._process.send_signal(number)
 
-    def _read(self):
+    def _read(self) -> None:
+        assert self._process.stdout is not None
         for line in self._process.stdout:
             line = line.rstrip()
             self._lines.append(line)
-            # What it does not log at its end is what libraries say of what is gone already.
+            # Unformatted lines during shutdown are complaints of libraries about gone objects.
             if self._stopping and not line.startswith((*_QUIET, *_LOUD)):
                 continue
             if line and (self._verbose or not line.startswith(_QUIET)):

@@ -1,20 +1,26 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Record what goes over the topics of the chain while a bag is played."""
+"""Record the topics of the chain while a bag is played."""
 
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 import time
+from typing import Any
 
 from geometry_msgs.msg import PoseArray, TransformStamped
 from hooc_perception.io.bags.raw_writer import RawBagWriter
+from hooc_perception.ros.health.silence import type_name
 from hooc_perception.ros.qos import qos
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import String
 from visualization_msgs.msg import MarkerArray
 
-# Not views/*: large, a function of the raw images, and a reader of the bag would take them for
-# further cameras.
-_KINDS = {
+# Not views/*: they are large, follow from the raw images, and would look like further cameras to
+# a reader of the bag.
+_KINDS: dict[str, Any] = {
     '<camera>/depth/image_raw': Image, '<camera>/depth/camera_info': CameraInfo,
     '<camera>/extrinsics': TransformStamped, 'pixels/probabilities': PointCloud2,
     'pixels/<camera>/labels': Image, 'candidates/poses': PoseArray,
@@ -24,31 +30,35 @@ _KINDS = {
 
 
 class Recorder:
-    """Subscribe to all topics of the chain and write them as they come."""
+    """Subscribe to all topics of the chain and write their messages as they arrive."""
 
-    def __init__(self, node, path, cameras):
-        """Start to record; HoocError where the bag exists already."""
+    def __init__(self, node: Node, path: Path, cameras: Iterable[str]) -> None:
+        """Start to record; HoocError if the bag exists already."""
         self._node, self._writer = node, RawBagWriter(path)
-        self._subscriptions, self._began = [], time.time_ns()
+        self._subscriptions: list[Subscription] = []
+        self._began, cameras = time.time_ns(), tuple(cameras)
         for row, kind in _KINDS.items():
             for camera in cameras if '<camera>' in row else ('',):
                 self._subscribe(row, kind, row.replace('<camera>', camera))
 
-    def close(self):
+    def close(self) -> None:
         """Finish the bag."""
         for subscription in self._subscriptions:
             self._node.destroy_subscription(subscription)
         self._writer.__exit__()
 
-    def _subscribe(self, row, kind, topic):
+    def _subscribe(self, row: str, kind: Any, topic: str) -> None:
         name = self._node.resolve_topic_name(topic)
-        type_name = f'{kind.__module__.partition(".")[0]}/msg/{kind.__name__}'
         latched = qos(row).durability == DurabilityPolicy.TRANSIENT_LOCAL
 
-        def take(data, info):
-            # What is latched of the last scene is not of this one.
-            if info['source_timestamp'] >= self._began:
-                self._writer.write(name, type_name, data, time.time_ns(), latched)
+        type_of_kind = type_name(kind)
 
+        def take(data: bytes, info: Mapping[str, int]) -> None:
+            # Latched messages of the previous scene do not belong here.
+            if info['source_timestamp'] >= self._began:
+                self._writer.write(name, type_of_kind, data, time.time_ns(), latched)
+
+        # rclpy's annotation of callbacks leaves out the message info.
+        callback: Callable[..., None] = take
         self._subscriptions.append(
-            self._node.create_subscription(kind, topic, take, qos(row), raw=True))
+            self._node.create_subscription(kind, topic, callback, qos(row), raw=True))

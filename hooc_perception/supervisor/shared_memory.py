@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Shared memory that killed processes could not give back."""
+"""Free shared memory of killed processes."""
 
 from contextlib import suppress
 import fcntl
@@ -11,17 +11,17 @@ import time
 
 FOLDER = Path('/dev/shm')
 YOUNG_S = 5.0
-# A segment of Fast DDS and the file that its owner keeps locked for as long as it lives.
+# The lock file of a Fast DDS segment; the owner holds the lock as long as it lives.
 _LOCK_FILE = re.compile(r'fastrtps_[0-9a-f]{16}_el')
 
 
-def free_orphans(folder=FOLDER):
+def free_orphans(folder: Path = FOLDER) -> int:
     """
     Remove the Fast DDS segments of this user whose owners have died; return their bytes.
 
-    Fast DDS leaves them behind where a process is killed: 64 MB each with our profile, so that
-    a node that dies again and again would fill the memory of the machine. Whoever still has
-    one mapped keeps what it has.
+    Fast DDS leaves them behind if a process is killed: 64 MB each with our profile, so that a
+    node that keeps dying would fill the memory of the machine. Processes that have one mapped
+    are not affected.
 
     :param folder: where shared memory is mounted.
     """
@@ -31,7 +31,7 @@ def free_orphans(folder=FOLDER):
             continue
         with suppress(OSError):
             status = lock.stat()
-            # One that is being made has no lock yet.
+            # A segment that is being created has no lock yet.
             if status.st_uid != os.getuid() or time.time() - status.st_mtime < YOUNG_S:
                 continue
             with open(lock, 'rb') as file:

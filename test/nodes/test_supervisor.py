@@ -100,7 +100,7 @@ def test_failed_transitions_and_refused_parameters_say_why(tmp_path):
 
 
 def test_lost_answers_are_asked_for_again(monkeypatch, tmp_path):
-    monkeypatch.setattr('hooc_perception.supervisor.supervisor.RETRY_S', 0.3)
+    monkeypatch.setattr('hooc_perception.supervisor.services.RETRY_S', 0.3)
     with Supervisor(('replay_node',), isolated=True) as supervisor:
         class Forgetful:
             """A client whose every first call is never answered."""
@@ -113,8 +113,9 @@ def test_lost_answers_are_asked_for_again(monkeypatch, tmp_path):
                 self.calls += 1
                 return Future() if self.calls == 1 else self.client.call_async(request)
 
-        forgetful = {key: Forgetful(client) for key, client in supervisor._clients.items()}
-        supervisor._clients = forgetful
+        forgetful = {key: Forgetful(client)
+                     for key, client in supervisor._services.clients.items()}
+        supervisor._services.clients = forgetful
         assert supervisor.state('replay_node') == 1
         supervisor.set_parameters('replay_node', {'rate': 2.0})
         assert supervisor.get_parameters('replay_node', ['rate']) == {'rate': 2.0}

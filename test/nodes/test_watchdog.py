@@ -83,7 +83,7 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
                 (m.ns, m.id) for message in markers for m in message.markers
                 if m.action == m.DELETE and m.header.frame_id == 'table'}), markers
             assert until(lambda: said(name)), latest
-            assert until(lambda: not watchdog.reviving() and heard[-1].poses), f'no {name}'
+            assert until(lambda: not watchdog.restarting() and heard[-1].poses), f'no {name}'
         assert watchdog.deaths == dict.fromkeys(CHAIN, 1)
         # The file that the node was started with again says 0.1.
         assert supervisor.get_parameters('ingestion_node', ['max_set_spread_s']) == {
@@ -91,7 +91,7 @@ def test_each_node_that_is_killed_comes_back(repository, cheap, own_environment)
         assert until(lambda: 'hooc_supervisor: parsing_node' in latest)
 
 
-def test_the_keeper_speaks_in_the_frame_and_by_the_clock_of_the_dead(own_environment):
+def test_retraction_uses_the_frame_and_the_clock_of_the_dead(own_environment):
     given = {'target_frame': 'bench', 'use_sim_time': True}
     with Supervisor(('parsing_node',), {'parsing_node': given}, isolated=True) as supervisor:
         watchdog, heard = Watchdog(supervisor, pause_s=0.1, hung_s=100.0), []

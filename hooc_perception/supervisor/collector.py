@@ -1,15 +1,17 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Listen to what the nodes say about a played bag; written as any user could write it."""
+"""Collect what the nodes publish about a played bag, as any client could do it."""
 
 from collections import Counter
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 import json
+from typing import Any, TypeAlias
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import INGESTION
-from hooc_perception.core.types import Energy, ParsedScene, PixelProbabilities
+from hooc_perception.core.types import Candidates, Energy, ParsedScene, PixelProbabilities
 from hooc_perception.ros.messages.conversions import nanoseconds
 from hooc_perception.ros.messages.point_clouds import cloud_rows
 from hooc_perception.ros.messages.stages import (
@@ -17,76 +19,92 @@ from hooc_perception.ros.messages.stages import (
     probabilities_from_message,
 )
 from hooc_perception.ros.qos import qos
+from rclpy.node import Node
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import String
 
 
 @dataclass(frozen=True)
-class Answer:
+class FrameSetResult:
     """
-    What the nodes found for one frame set.
+    The result of the nodes for one frame set.
 
-    :ivar seconds: from the last depth image's arrival to the objects' publication.
+    :ivar stamp_ns: stamp of the frame set.
     :ivar parsed: its pool holds the first proposals, not those of later rounds.
-    :ivar probabilities: PixelProbabilities, None if they were not heard.
-    :ivar images: {camera: which of its images, from 0 on} the frame set is made of.
+    :ivar seconds: from the arrival of the last depth image to the publication of the objects.
+    :ivar probabilities: None if they were not received.
+    :ivar images: {camera: index of its image in the bag, from 0 on}.
     """
 
     stamp_ns: int
     parsed: ParsedScene
     seconds: float
     probabilities: PixelProbabilities | None
-    images: dict
+    images: dict[str, int]
 
 
 _INGESTION = f'{INGESTION}: '
-_PARTS = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
-          'scene/summary': String, 'candidates/poses': PoseArray,
-          'candidates/attributes': PointCloud2, 'pixels/probabilities': PointCloud2}
+_PARTS: dict[str, Any] = {
+    'objects/poses': PoseArray, 'objects/attributes': PointCloud2, 'scene/summary': String,
+    'candidates/poses': PoseArray, 'candidates/attributes': PointCloud2,
+    'pixels/probabilities': PointCloud2}
+# Of a message: rclpy's annotation of callbacks leaves it out.
+Info: TypeAlias = Mapping[str, int]
 
 
 class Collector:
     """
-    Subscribe to the raw images (for their arrival) and to the answers.
+    Subscribe to the raw images, for their arrival, and to the results.
 
-    :param node: rclpy Node in the namespace of the chain.
+    :param node: a node in the namespace of the chain.
+    :ivar image_stamps: {camera: stamps of its images}, ns.
+    :ivar last_sent: stamp of the last frame set of the ingestion node, None before the first.
+    :ivar replay: the last content of `replay/status`.
+    :ivar errors: (time in ns, sentence) of the errors in /diagnostics.
     """
 
-    def __init__(self, node):
-        """Subscribe to all but the cameras."""
-        self._node, self._images, self.sent = node, [], None
+    def __init__(self, node: Node) -> None:
+        """Subscribe to everything but the cameras."""
+        self._node, self.last_sent = node, None
+        self._images: list[Subscription] = []
         for topic, kind in _PARTS.items():
             node.create_subscription(kind, topic, self._taker(topic), qos(topic))
-        node.create_subscription(String, 'replay/status', self._on_status, qos('replay/status'))
-        node.create_subscription(DiagnosticArray, '/diagnostics', self._on_diagnostics, 10)
+        on_status: Callable[..., None] = self._on_status
+        on_diagnostics: Callable[..., None] = self._on_diagnostics
+        node.create_subscription(String, 'replay/status', on_status, qos('replay/status'))
+        node.create_subscription(DiagnosticArray, '/diagnostics', on_diagnostics, 10)
         self.expect(())
 
-    def expect(self, cameras):
-        """Forget the last bag; listen to these cameras."""
+    def expect(self, cameras: Iterable[str]) -> None:
+        """Forget the last bag and subscribe to these cameras."""
         for subscription in self._images:
             self._node.destroy_subscription(subscription)
-        self._parts = {topic: {} for topic in _PARTS}
-        self._published = {}        # stamp -> ns of the publication of objects/poses
-        self.heard = {camera: [] for camera in cameras}     # stamps of its images
-        self._arrived = {}          # stamp of an image -> ns of its latest arrival
-        self._before, self.sent = self.sent, None   # stamp of ingestion's latest frame set
-        self._news_ns, self._reports = 0, Counter()     # when sent; node -> reports since then
-        self.replay, self.errors = {}, []
-        self._said = {}             # name of a status -> what it says
+        # Topic -> {stamp: message}, and what follows from the messages, by stamp.
+        self._parts: dict[str, dict[int, Any]] = {topic: {} for topic in _PARTS}
+        self._published: dict[int, int] = {}    # time (ns) of the publication of objects/poses
+        self.image_stamps: dict[str, list[int]] = {camera: [] for camera in cameras}
+        self._arrived: dict[int, int] = {}      # time (ns) of the latest arrival of an image
+        self._sent_before, self.last_sent = self.last_sent, None
+        self._news_ns = 0                       # when the last message was sent
+        self._reports: Counter[str] = Counter()     # node -> reports since then
+        self.replay: dict[str, Any] = {}
+        self.errors: list[tuple[int, str]] = []
+        self._statuses: dict[str, str] = {}     # name of a status -> its message
         self._images = [self._node.create_subscription(
             Image, f'{camera}/depth/image_raw', self._image_taker(camera),
-            qos('<camera>/depth/image_raw')) for camera in cameras]
+            qos('<camera>/depth/image_raw')) for camera in self.image_stamps]
 
-    def _image_taker(self, camera):
-        def take(message, info):
+    def _image_taker(self, camera: str) -> Callable[..., None]:
+        def take(message: Image, info: Info) -> None:
             stamp = nanoseconds(message.header.stamp)
-            self.heard[camera].append(stamp)
+            self.image_stamps[camera].append(stamp)
             self._note_news(info)
             self._arrived[stamp] = max(self._arrived.get(stamp, 0), info['received_timestamp'])
         return take
 
-    def _taker(self, topic):
-        def take(message, info):
+    def _taker(self, topic: str) -> Callable[..., None]:
+        def take(message: Any, info: Info) -> None:
             if topic == 'scene/summary':
                 message = json.loads(message.data)
                 stamp = message['stamp_ns']
@@ -100,62 +118,62 @@ class Collector:
                 self._published[stamp] = info['source_timestamp']
         return take
 
-    def _note_news(self, info):
+    def _note_news(self, info: Info) -> None:
         self._news_ns = max(self._news_ns, info['source_timestamp'])
         self._reports.clear()
 
-    def _on_status(self, message, info):
+    def _on_status(self, message: String, info: Info) -> None:
         self.replay = json.loads(message.data)
         self._note_news(info)
 
-    def _on_diagnostics(self, message, info):
+    def _on_diagnostics(self, message: DiagnosticArray, info: Info) -> None:
         stamp = nanoseconds(message.header.stamp)
-        # By the time of sending: topics do not keep the order among each other.
+        # By the time of sending: messages of different topics may overtake each other.
         if info['source_timestamp'] > self._news_ns:
             self._reports.update({s.name.partition(':')[0] for s in message.status})
         for status in message.status:
-            self._said[status.name] = status.message
+            self._statuses[status.name] = status.message
             if status.level == DiagnosticStatus.ERROR:
                 self.errors.append((stamp, f'{status.name}: {status.message}'))
             for value in status.values if status.name == f'{_INGESTION}views' else ():
-                # Until it sends again it reports the last set of the last bag.
-                if value.key == 'stamp_ns' and int(value.value) != self._before:
-                    self.sent = int(value.value)
+                # Until it sends again it reports the last frame set of the last bag.
+                if value.key == 'stamp_ns' and int(value.value) != self._sent_before:
+                    self.last_sent = int(value.value)
 
-    def idle(self, names, reports=2):
+    def idle(self, names: Collection[str], reports: int = 2) -> bool:
         """
-        Say whether nodes have nothing left to do: each has reported so often since the last news.
+        Return whether nodes have nothing left to do: each reported this often since the last news.
 
-        A node reports once a second, but not while it computes. Between two reports it has been
-        given all that had arrived.
+        A node reports once per second, but not while it computes. Between two reports it has
+        processed all messages that had arrived.
         """
         return all(self._reports[name] >= reports for name in names)
 
-    def complaints(self, since_ns):
+    def errors_since(self, since_ns: int) -> tuple[list[str], list[str]]:
         """
-        Return ([sentence] of ingestion, [sentence] of the other nodes), errors since a time.
+        Return the errors ([of ingestion], [of the other nodes]) since a time.
 
-        What ingestion refuses costs one image; the others then have given up a frame set.
+        An error of ingestion costs one image, one of the other nodes a frame set.
         """
         sentences = [sentence for when, sentence in self.errors if when > since_ns]
         own = [sentence for sentence in sentences if sentence.startswith(_INGESTION)]
         return own, [sentence for sentence in sentences if sentence not in own]
 
-    def standing(self):
-        """Return in words what every node has said last, without what is all right."""
-        nodes = {}
-        for name, sentence in sorted(self._said.items()):
+    def status_report(self) -> str:
+        """Return in words what every node reported last, without the parts that are fine."""
+        nodes: dict[str, list[str]] = {}
+        for name, sentence in sorted(self._statuses.items()):
             node, _, thing = name.partition(': ')
             nodes.setdefault(node, []).extend([] if sentence == 'ok' else [f'{thing} {sentence}'])
         return '; '.join(f'{node}: {", ".join(said) or "ok"}' for node, said in nodes.items()) or (
-            'no node has said anything')
+            'no node has reported anything')
 
-    def newest_answer(self):
-        """Return the Answer to the newest frame set that has one, None where none has."""
-        return next(filter(None, map(self.answer, sorted(self._published, reverse=True))), None)
+    def newest_result(self) -> FrameSetResult | None:
+        """Return the result of the newest frame set that has one, None if none has."""
+        return next(filter(None, map(self.result, sorted(self._published, reverse=True))), None)
 
-    def answer(self, stamp_ns):
-        """Return the Answer to the frame set of a stamp, None while parts are missing."""
+    def result(self, stamp_ns: int) -> FrameSetResult | None:
+        """Return the result of the frame set of a stamp, None while parts are missing."""
         poses, attributes, summary = (self._parts[topic].get(stamp_ns) for topic in (
             'objects/poses', 'objects/attributes', 'scene/summary'))
         if poses is None or attributes is None or summary is None:
@@ -173,16 +191,17 @@ class Collector:
             sigma_r=rows['sigma_r'].copy())
         probabilities = self._parts['pixels/probabilities'].get(stamp_ns)
         arrived = max((t for s, t in self._arrived.items() if s >= stamp_ns), default=0)
-        return Answer(stamp_ns, parsed, max(0.0, (self._published[stamp_ns] - arrived) * 1e-9),
-                      probabilities and probabilities_from_message(probabilities),
-                      self.images_of(stamp_ns))
+        return FrameSetResult(
+            stamp_ns, parsed, max(0.0, (self._published[stamp_ns] - arrived) * 1e-9),
+            None if probabilities is None else probabilities_from_message(probabilities),
+            self.images_of(stamp_ns))
 
-    def images_of(self, stamp_ns):
-        """Return {camera: which of its images} of a frame set: the first ones not before it."""
+    def images_of(self, stamp_ns: int) -> dict[str, int]:
+        """Return {camera: index of its image} of a frame set: the first ones not before it."""
         return {camera: sum(stamp < stamp_ns for stamp in stamps)
-                for camera, stamps in self.heard.items()}
+                for camera, stamps in self.image_stamps.items()}
 
-    def _pool(self, stamp_ns):
+    def _pool(self, stamp_ns: int) -> Candidates | None:
         poses = self._parts['candidates/poses'].get(stamp_ns)
         attributes = self._parts['candidates/attributes'].get(stamp_ns)
         if poses is None or attributes is None:

@@ -32,7 +32,7 @@ T = TypeVar('T')
 class Waiter(Protocol):
     """Serves the callbacks of a node while somebody waits."""
 
-    def wait(self, condition: Callable[[], T], timeout_s: float,
+    def wait(self, condition: Callable[[], T | None], timeout_s: float,
              complaint: str | Callable[[], str]) -> T:
         """Serve callbacks until `condition()`; return its value, or raise the complaint."""
         ...
@@ -140,6 +140,5 @@ class NodeServices:
                 futures.append(self.clients[name, kind].call_async(request))
             return next((future for future in futures if future.done()), None)
 
-        done = self._waiter.wait(answered, timeout_s, complaint or f'{name} does not answer')
-        assert done is not None     # wait returns nothing that is false
-        return done.result()
+        complaint = complaint or f'{name} does not answer within {timeout_s:g} s'
+        return self._waiter.wait(answered, timeout_s, complaint).result()

@@ -171,7 +171,7 @@ class Supervisor:
             raise HoocError(f'{name} ended unexpectedly (exit code {process.exit_code()}): '
                             f'{process.last_words()}')
 
-    def wait(self, condition: Callable[[], T], timeout_s: float,
+    def wait(self, condition: Callable[[], T | None], timeout_s: float,
              complaint: str | Callable[[], str]) -> T:
         """
         Serve callbacks until `condition()`; return its value.

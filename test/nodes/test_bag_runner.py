@@ -28,7 +28,7 @@ class Script:
         self.heard = self.runner._collector
         self.heard.expect(['a', 'b'])
         # The parts of an answer are not looked into here.
-        self.heard.answer = lambda stamp: (
+        self.heard.result = lambda stamp: (
             SimpleNamespace(stamp_ns=stamp) if stamp in self.heard._published else None)
 
     def wait(self, condition, timeout_s, complaint):
@@ -83,7 +83,7 @@ class Script:
                     self.report(name, 'node')
 
     def listen(self):
-        return self.runner._listen(BAG, 0)
+        return self.runner._collect(BAG, 0)
 
 
 def time(stamp_ns):
@@ -213,13 +213,13 @@ def test_a_lost_set_is_played_once_more(script, monkeypatch, capsys):
     monkeypatch.setattr(script.runner, '_play', one_play)
     monkeypatch.setattr(script.runner, 'start_over', lambda: begun.append(True))
     assert script.runner.play(BAG) == 'answer' and begun == [True]
-    assert 'gone; it is played once more' in capsys.readouterr().err
+    assert 'gone; playing it once more' in capsys.readouterr().err
     with pytest.raises(HoocError, match='gone'):
         script.runner.play(BAG)
 
 
 def test_what_ingestion_said_of_the_last_bag_does_not_count(script):
-    script.heard.sent = 1 * S
+    script.heard.last_sent = 1 * S
     script.heard.expect(['a', 'b'])
     play(script, [2 * S], [9 * S])
     script.idle(sent=1 * S)
@@ -233,5 +233,5 @@ def test_an_answer_knows_its_images():
                            destroy_subscription=lambda _: None)
     collector = Collector(node)
     collector.expect(['a', 'b'])
-    collector.heard = {'a': [1, 5, 9], 'b': [2, 6]}
+    collector.image_stamps = {'a': [1, 5, 9], 'b': [2, 6]}
     assert collector.images_of(5) == {'a': 1, 'b': 1}

@@ -135,11 +135,11 @@ def comparison(entry: Mapping[str, Any], truth: 'Sequence[TrueObject]',
     matched = {score.estimate for score in scores}
     rows = []
     for score in scores:
-        found = score.estimate is not None
-        rows.append((score.category, 'yes' if found else 'no',
+        i = score.estimate
+        rows.append((score.category, 'no' if i is None else 'yes',
                      'yes' if score.localized else 'no',
-                     f'{1000 * score.centre_m:.0f}' if found else None,
-                     estimates[score.estimate].score if found else None))
+                     None if i is None else f'{1000 * score.centre_m:.0f}',
+                     None if i is None else estimates[i].score))
     false = [estimate for i, estimate in enumerate(estimates) if i not in matched]
     rows += [(estimate.category, 'false positive', None, None, estimate.score)
              for estimate in false]

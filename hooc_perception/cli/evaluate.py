@@ -79,7 +79,8 @@ def run(args: Namespace) -> None:
                  full if contents else ())
     write_json(args.json, as_json(scene_set, evaluations, visibility, truth_energy))
     if args.plots:
-        _write_plots(args.plots, evaluations, scene_set.category_names)
+        from hooc_perception.evaluation.plots import write_plots
+        write_plots(args.plots, [e for e in evaluations if e.scores], scene_set.category_names)
 
 
 def _labels(paths: Sequence[str]) -> list[str]:
@@ -129,12 +130,3 @@ def _visibility_tables(visibility: dict[str, list['Visibility']]) -> list['Table
         return []
     return [*(paper_tables.visibility_table(name, rows) for name, rows in visibility.items()),
             paper_tables.paper_visibility()]
-
-
-def _write_plots(folder: str, evaluations: Sequence['Evaluation'],
-                 categories: Sequence[str]) -> None:
-    """Write the plots of the results that have scores by poses."""
-    from hooc_perception.evaluation.plots import write_plots
-    scored = [e for e in evaluations if e.scores]
-    write_plots(folder, [(e.label, e.scores, e.per_category(categories)) for e in scored],
-                categories, scored)

@@ -14,7 +14,8 @@ from hooc_perception.errors import HoocError
 
 if TYPE_CHECKING:
     from hooc_perception.io.bags.reader import BagScene
-    from hooc_perception.supervisor.bags import Answer, BagRunner
+    from hooc_perception.supervisor.bags import BagRunner
+    from hooc_perception.supervisor.collector import Answer
     from hooc_perception.trained.folder import ModelFolder
 
 # Upper limits of the node parameters `seed` and `wait_for_answer_s`.
@@ -164,7 +165,7 @@ def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
         runner = BagRunner(supervisor, args.timeout, getattr(args, 'record', None))
         used = supervisor.get_parameters(PARSING, ('profile', 'seed'))
         done = play_all(runner, tqdm(bags, desc='scenes', unit='scene', disable=None))
-    return *done, used['profile'], used['seed']
+    return *done, str(used['profile']), int(used['seed'])
 
 
 def play_all(runner: 'BagRunner', bags: 'Iterable[BagScene]',

@@ -1,50 +1,76 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Local features and point pairs, category by category: what one would try first.
+Baselines: local features (FPFH) and point pair features (PPF), category by category.
 
-Both register every generic model, at its own size, to the fused cloud of what stands on the
-table, and take the best fits one after another. They set the floor that joint parsing has to
-clear; nothing else in the package uses them.
+Both register every generic model, at its own size, to the fused cloud of the objects on the
+table, and take the best fits one after another. Nothing else in the package uses them.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 import itertools
+from pathlib import Path
 import time
+from typing import Any, Protocol, TypeAlias
 
+from hooc_perception.core.arrays import BoolArray, Float32Array, Float64Array
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import back_project, pose_from_matrix, stage_rng
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
+from hooc_perception.core.types import GenericModel, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.visibility import surface_samples
 from hooc_perception.io.scenes.results import write_results
+from hooc_perception.io.scenes.scene_set import SceneSet
 import numpy as np
 import open3d as o3d
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 from tqdm import tqdm
+
+Cloud: TypeAlias = o3d.geometry.PointCloud
+# Category, T_world_model (4, 4), share of explained model points.
+Fit: TypeAlias = tuple[str, Float64Array, float]
 
 
 @dataclass(frozen=True)
 class BaselineConfig(Config):
     """Parameters of both baselines; customary values, chosen without looking at scores."""
 
-    voxel_m: float = param(0.005, 'Side of the voxels that thin both clouds.', 'm', 0.001, 0.05)
+    voxel_m: float = param(0.005, 'Voxel size to which both clouds are downsampled.', 'm', 0.001,
+                           0.05)
     feature_radius: float = param(5.0, 'Radius of the features, in voxels.', '', 2.0, 20.0)
-    pair_step: float = param(0.05, 'Steps of the point pair features and distance of the points '
-                             "that they are taken from, as a share of the model's diameter.", '',
+    pair_step: float = param(0.05, 'Steps of the point pair features and distance between the '
+                             "points that they use, as a share of the model's diameter.", '',
                              0.01, 0.2)
-    iterations: int = param(100000, 'RANSAC draws of three correspondences.', '', 100, 10000000)
-    inlier_m: float = param(0.01, 'A model point this near to the scene is explained by it.', 'm',
+    iterations: int = param(100000, 'RANSAC samples of three correspondences.', '', 100, 10000000)
+    inlier_m: float = param(0.01, 'A model point this close to a scene point is explained.', 'm',
                             0.001, 0.05)
-    min_fit: float = param(0.35, 'Least share of explained model points; half of a model looks '
+    min_fit: float = param(0.35, 'Minimum share of explained model points; half of a model faces '
                            'away from any one camera.', '', 0.0, 1.0)
-    min_fresh: float = param(0.5, 'Least share of the scene points that a model takes which no '
-                             'better one has taken.', '', 0.0, 1.0)
+    min_fresh: float = param(0.5, 'Minimum share of the scene points of a model that no better '
+                             'one has taken.', '', 0.0, 1.0)
 
 
-def fused_cloud(views, voxel_m):
-    """Return an Open3D cloud, with normals, of what stands on the table in RectifiedViews."""
+class Method(Protocol):
+    """A way to find one model in a scene."""
+
+    def model(self, cloud: Cloud) -> Any:
+        """Return what `poses` needs of a model, whose cloud comes first."""
+        ...
+
+    def scene(self, cloud: Cloud) -> Any:
+        """Return what `poses` needs of a scene."""
+        ...
+
+    def poses(self, model: Any, scene: Any) -> Sequence[Float64Array]:
+        """Return candidate T_world_model, best first."""
+        ...
+
+
+def fused_cloud(views: Sequence[RectifiedView], voxel_m: float) -> Cloud:
+    """Return an Open3D cloud, with normals, of the objects on the table."""
     cloud = o3d.geometry.PointCloud()
     for view in observe(views).views:
         part = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(
@@ -58,7 +84,8 @@ def fused_cloud(views, voxel_m):
     return cloud.voxel_down_sample(voxel_m)
 
 
-def model_cloud(model, voxel_m, rng, samples=20000):
+def model_cloud(model: GenericModel, voxel_m: float, rng: np.random.Generator,
+                samples: int = 20000) -> Cloud:
     """Return an Open3D cloud, with normals, of a GenericModel's surface."""
     points, normals = surface_samples(model.vertices, model.faces, samples, rng)
     cloud = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
@@ -69,21 +96,21 @@ def model_cloud(model, voxel_m, rng, samples=20000):
 class Fpfh:
     """FPFH features (Rusu et al. 2009), RANSAC over their correspondences."""
 
-    def __init__(self, config, seed):
+    def __init__(self, config: BaselineConfig, seed: int) -> None:
         self.config = config
         o3d.utility.random.seed(seed)
 
-    def scene(self, cloud):
-        """Return (cloud, features), which `poses` needs of a scene."""
+    def scene(self, cloud: Cloud) -> tuple[Cloud, Any]:
+        """Return (cloud, features)."""
         radius = self.config.feature_radius * self.config.voxel_m
         return cloud, o3d.pipelines.registration.compute_fpfh_feature(
             cloud, o3d.geometry.KDTreeSearchParamHybrid(radius, 100))
 
-    # A model is described as a scene is.
+    # Models and scenes are described alike.
     model = scene
 
-    def poses(self, model, scene):
-        """Return candidate T_world_model, best first."""
+    def poses(self, model: tuple[Cloud, Any], scene: tuple[Cloud, Any]) -> list[Float64Array]:
+        """Return the best T_world_model, [] where there is none."""
         registration = o3d.pipelines.registration
         reach = 1.5 * self.config.voxel_m
         found = registration.registration_ransac_based_on_feature_matching(
@@ -98,7 +125,7 @@ class Fpfh:
 class Ppf:
     """Point pair features (Drost et al. 2010) as in OpenCV's surface_matching."""
 
-    def __init__(self, config, seed):
+    def __init__(self, config: BaselineConfig, seed: int) -> None:
         import cv2
         if not hasattr(cv2, 'ppf_match_3d_PPF3DDetector'):
             raise HoocError('the baseline ppf needs OpenCV with its surface_matching module; '
@@ -106,21 +133,21 @@ class Ppf:
                             'opencv-python-headless')
         self.cv2, self.config = cv2, config
 
-    def model(self, cloud):
+    def model(self, cloud: Cloud) -> tuple[Cloud, Any, float]:
         """Return (cloud, trained detector, spacing of its points in metres)."""
-        spacing = max(2 * self.config.voxel_m, self.config.pair_step * np.linalg.norm(
-            cloud.get_max_bound() - cloud.get_min_bound()))
-        # OpenCV thins once more, by shares of the extents: finely enough to change nothing.
+        spacing = max(2 * self.config.voxel_m, self.config.pair_step * float(np.linalg.norm(
+            cloud.get_max_bound() - cloud.get_min_bound())))
+        # OpenCV downsamples again, by shares of the extents: finely enough to change nothing.
         detector = self.cv2.ppf_match_3d_PPF3DDetector(self.config.pair_step / 2,
                                                        self.config.pair_step)
         detector.trainModel(_oriented(cloud.voxel_down_sample(spacing)))
         return cloud, detector, spacing
 
-    def scene(self, cloud):
-        """Return (cloud,): how it is thinned is the model's choice."""
+    def scene(self, cloud: Cloud) -> tuple[Cloud]:
+        """Return (cloud,): its downsampling depends on the model."""
         return (cloud,)
 
-    def poses(self, model, scene):
+    def poses(self, model: tuple[Cloud, Any, float], scene: tuple[Cloud]) -> list[Float64Array]:
         """Return candidate T_world_model, best first."""
         _, detector, spacing = model
         points = _oriented(scene[0].voxel_down_sample(spacing))
@@ -128,18 +155,21 @@ class Ppf:
         return [np.array(pose.pose) for pose in found[:5]]
 
 
-def _oriented(cloud):
+def _oriented(cloud: Cloud) -> Float32Array:
     """Return (n, 6) float32 points and unit normals of an Open3D cloud."""
     cloud.normalize_normals()
-    return np.ascontiguousarray(np.hstack([cloud.points, cloud.normals]), np.float32)
+    return np.ascontiguousarray(np.hstack([np.asarray(cloud.points),
+                                           np.asarray(cloud.normals)]), np.float32)
 
 
-METHODS = {'fpfh': Fpfh, 'ppf': Ppf}
+METHODS: dict[str, type[Fpfh] | type[Ppf]] = {'fpfh': Fpfh, 'ppf': Ppf}
 
 
-def run_baseline(name, scene_set, models, path, seed=0, config=BaselineConfig()):
+def run_baseline(name: str, scene_set: SceneSet, models: Mapping[str, GenericModel],
+                 path: str | Path, seed: int = 0,
+                 config: BaselineConfig = BaselineConfig()) -> None:
     """
-    Write a baseline's results file for all scenes of a set.
+    Write the results file of a baseline for all scenes of a set.
 
     :param name: 'fpfh' or 'ppf'.
     :param models: {category: GenericModel}; shape and extents are enough.
@@ -162,17 +192,19 @@ def run_baseline(name, scene_set, models, path, seed=0, config=BaselineConfig())
     write_results(path, scene_set.name, entries, profile=f'baseline {name}', seed=seed)
 
 
-def find(method, views, prepared, limit, config):
+def find(method: Method, views: Sequence[RectifiedView], prepared: Mapping[str, Any],
+         limit: int, config: BaselineConfig) -> list[Fit]:
     """
     Return [(category, T_world_model, share of explained model points)], the best fit first.
 
-    A pass over all categories takes at most one of each; where several may stand there, the next
-    pass looks at the points that are left, until one takes nothing.
+    A pass over all categories takes at most one object of each; where more are allowed, the next
+    pass uses the remaining points, until a pass takes nothing.
 
     :param prepared: {category: what `method.model` made of its model}.
-    :param limit: instances of a category at most, 0 = any number.
+    :param limit: maximum number of instances per category, 0 = no limit.
     """
-    cloud, out = fused_cloud(views, config.voxel_m), []
+    cloud = fused_cloud(views, config.voxel_m)
+    out: list[Fit] = []
     passes = itertools.count() if limit == 0 else range(limit)
     for _ in passes:
         if len(cloud.points) < 10:
@@ -182,13 +214,14 @@ def find(method, views, prepared, limit, config):
         if not chosen:
             break
         out += chosen
-        cloud = cloud.select_by_index(np.flatnonzero(free))
+        cloud = cloud.select_by_index(np.flatnonzero(free).tolist())
     return out
 
 
-def _pass(method, cloud, prepared, config):
-    """Return (as `find`, one a category at most; (n,) bool, points that nothing took)."""
-    scene, tree = method.scene(cloud), cKDTree(np.asarray(cloud.points))
+def _pass(method: Method, cloud: Cloud, prepared: Mapping[str, Any],
+          config: BaselineConfig) -> tuple[list[Fit], BoolArray]:
+    """Return (as `find`, at most one per category; (n,) bool, points that nothing took)."""
+    scene, tree = method.scene(cloud), KDTree(np.asarray(cloud.points))
     fits = []
     for category, model in prepared.items():
         for T in method.poses(model, scene):
@@ -201,7 +234,8 @@ def _pass(method, cloud, prepared, config):
                 taken = np.unique(np.concatenate([
                     [], *tree.query_ball_point(points, config.inlier_m)]).astype(int))
                 fits.append((float(explained.mean()), category, T, taken))
-    free, out = np.ones(len(cloud.points), bool), {}
+    free = np.ones(len(cloud.points), bool)
+    out: dict[str, Fit] = {}
     # Large explained pieces first: a small model fits anywhere.
     for fit, category, T, taken in sorted(fits, key=lambda f: -f[0] * len(f[3])):
         if category not in out and free[taken].mean() >= config.min_fresh:
@@ -210,7 +244,8 @@ def _pass(method, cloud, prepared, config):
     return list(out.values()), free
 
 
-def _entry(category, T_world_model, fit, model):
+def _entry(category: str, T_world_model: Float64Array, fit: float,
+           model: GenericModel) -> dict[str, Any]:
     """Return the results entry of one found model."""
     translation, rotation = pose_from_matrix(T_world_model)
     return {'category': category, 'score': fit, 'translation': translation.tolist(),

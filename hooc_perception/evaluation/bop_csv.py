@@ -2,11 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Export results in the CSV format of the BOP challenge: scene_id,im_id,obj_id,score,R,t,time."""
 
+from pathlib import Path
 import re
+from typing import Any
 
 from hooc_perception.core.geometry import inverse, matrix_from_pose
 from hooc_perception.evaluation.matching import in_frame_of, posed
 from hooc_perception.io.scenes.files import write_atomically
+from hooc_perception.io.scenes.scene_set import SceneSet
 from hooc_perception.objects.mesh import mesh_box
 
 _OBJECT = re.compile(r'obj_(\d+)\Z')
@@ -14,14 +17,14 @@ _SCENE = re.compile(r'(\d{6})(?:_(\d{6}))?\Z')
 _VIEW = re.compile(r'view_(\d+)\Z')
 
 
-def write_bop_csv(path, results, scene_set):
+def write_bop_csv(path: str | Path, results: dict[str, Any], scene_set: SceneSet) -> int:
     """
-    Write one row for every estimate in every view, as BOP expects; return the number of rows.
+    Write one row per estimate and view, as BOP expects; return the number of rows.
 
     R (row major) and t (mm) map the model file's own coordinates to the camera; our poses are
-    those of the bounding box's centre. BOP knows no size: that of the estimate is left out. Of
-    sets that are not BOP's, scenes count from 1, images from 0 in camera order, and objects are
-    numbered as the categories.
+    those of the bounding box's centre. BOP has no sizes, so they are left out. In sets that are
+    not BOP's, scenes count from 1, images from 0 in camera order, and objects are numbered as
+    the categories.
 
     :param results: content of a results file.
     """
@@ -51,8 +54,8 @@ def write_bop_csv(path, results, scene_set):
     return len(rows) - 1
 
 
-def _object_ids(scene_set):
-    """Return {category: BOP's obj_id}, from the mesh's name where it is BOP's."""
+def _object_ids(scene_set: SceneSet) -> dict[str, int]:
+    """Return {category: obj_id of BOP}, from the name of the mesh file where it is BOP's."""
     out = {}
     for index, category in enumerate(scene_set.categories):
         match = _OBJECT.match(category.mesh_path.stem)

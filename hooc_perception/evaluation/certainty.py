@@ -1,18 +1,22 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Whether scores are probabilities and sigmas hold what they promise."""
+"""Whether scores are calibrated probabilities and sigmas match the errors."""
 
+from collections.abc import Iterator
+
+from hooc_perception.core.arrays import BoolArray, Float64Array
+from hooc_perception.evaluation.evaluate import Evaluation
 from hooc_perception.evaluation.tables import Table
 import numpy as np
 
 SCORE_BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
 
 
-def verdicts(evaluation):
+def verdicts(evaluation: Evaluation) -> tuple[Float64Array, BoolArray]:
     """
     Return (score (n,) float64, right (n,) bool) of all estimates of an Evaluation.
 
-    Right is an estimate that is localized: its centre within half the model's size of a true
+    An estimate is right if it is localized: its centre within half the model's size of a true
     one of its category, one to one.
     """
     score, right = [], []
@@ -24,8 +28,9 @@ def verdicts(evaluation):
     return np.array(score, float), np.array(right, bool)
 
 
-def reliability(score, right):
-    """Return [(low, high, number, mean score, share that is right)] of bins that are not empty."""
+def reliability(score: Float64Array,
+                right: BoolArray) -> list[tuple[float, float, int, float, float]]:
+    """Return [(low, high, number, mean score, share that is right)] of the non-empty bins."""
     out = []
     for low, high in zip(SCORE_BINS[:-1], SCORE_BINS[1:]):
         mine = (score >= low) & ((score < high) | (high == 1.0))
@@ -35,8 +40,8 @@ def reliability(score, right):
     return out
 
 
-def score_table(evaluation):
-    """Return the Table that holds scores against what is right, None without estimates."""
+def score_table(evaluation: Evaluation) -> Table | None:
+    """Return the Table of scores beside the share that is right, None without estimates."""
     score, right = verdicts(evaluation)
     if not len(score):
         return None
@@ -45,20 +50,20 @@ def score_table(evaluation):
     return Table(f'Scores as probabilities: {evaluation.label}',
                  ('score', 'estimates', 'mean score', 'localized'),
                  (*rows, ('all', len(score), float(score.mean()), float(right.mean()))),
-                 ('A calibrated score is the share of its like that is localized.',),
+                 ('Calibrated: a score equals the share of such estimates that is localized.',),
                  (len(rows),))
 
 
-def sigma_errors(evaluation):
+def sigma_errors(evaluation: Evaluation) -> dict[str, Float64Array]:
     """
     Return {t, r: (n, 2) float64} of error and sigma, metres and radians, of localized objects.
 
-    What has no sigma is left out.
+    Objects without a sigma are left out.
     """
-    out = {'t': [], 'r': []}
+    out: dict[str, list[tuple[float, float]]] = {'t': [], 'r': []}
     for scene in evaluation.scores:
         for o in scene.objects:
-            if o.localized:
+            if o.localized and o.estimate is not None:
                 estimate = evaluation.estimates[scene.name][o.estimate]
                 out['t'].append((o.centre_m, estimate.sigma_t))
                 out['r'].append((o.rotation_rad, estimate.sigma_r))
@@ -66,15 +71,13 @@ def sigma_errors(evaluation):
     return {key: rows[np.isfinite(rows).all(1)] for key, rows in pairs.items()}
 
 
-def sigma_table(evaluation):
-    """Return the Table that holds sigmas against errors, None where the results have none."""
+def sigma_table(evaluation: Evaluation) -> Table | None:
+    """Return the Table of sigmas beside errors, None where the results have no sigmas."""
     rows = []
     for key, name, unit in (('t', 'sigma_t', 1000), ('r', 'sigma_r', 180 / np.pi)):
         pairs = sigma_errors(evaluation)[key]
         pairs = pairs[np.argsort(pairs[:, 1], kind='stable')]
-        parts = [('all', pairs)] + [(f'quarter {i}', part) for i, part in enumerate(
-            np.array_split(pairs, 4), 1)] if len(pairs) >= 8 else [('all', pairs)]
-        for which, part in parts:
+        for which, part in _quarters(pairs):
             if len(part):
                 error, sigma = part.T
                 rows.append((f'{name}, {which}', len(part), unit * float(np.median(sigma)),
@@ -84,5 +87,12 @@ def sigma_table(evaluation):
         return None
     return Table(f'Errors and sigmas: {evaluation.label}',
                  ('mm, deg', 'objects', 'median sigma', 'median error', 'within 1', 'within 2'),
-                 tuple(rows), ('Of localized objects, by quarters from the surest to the least '
-                               'sure; .68 within one sigma is what is promised.',))
+                 tuple(rows), ('Localized objects, in quarters by sigma from small to large. '
+                               'Ideal: .68 within one sigma.',))
+
+
+def _quarters(pairs: Float64Array) -> Iterator[tuple[str, Float64Array]]:
+    """Yield (name, rows) of all pairs and, where there are enough, of each quarter."""
+    yield 'all', pairs
+    if len(pairs) >= 8:
+        yield from ((f'quarter {i}', part) for i, part in enumerate(np.array_split(pairs, 4), 1))

@@ -10,11 +10,15 @@ model, and a symmetry S acts on the model before the truth's scale does. With eq
 error is BOP's own.
 """
 
-import functools
+from collections.abc import Sequence
+from typing import Protocol
 
+from hooc_perception.core.arrays import AnyArray, Float32Array, Float64Array, Int32Array
 from hooc_perception.core.geometry import matrix_from_pose
+from hooc_perception.core.memo import per_model
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.symmetry import is_ball, symmetry_rotations
+from hooc_perception.core.types import Camera, GenericModel, ObservedView, RectifiedView
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import pdist
@@ -23,54 +27,61 @@ VSD_DELTA_M = 0.015
 MAX_MSPD_POINTS = 1000
 
 
-def affine(pose, model):
+class Pose(Protocol):
+    """
+    An object's pose and size, estimated or true.
+
+    :ivar translation: (3,) centre of the bounding box, world, metres.
+    :ivar rotation_xyzw: (4,) unit quaternion, model axes to world.
+    :ivar size: (3,) extents along the model axes, metres.
+    """
+
+    @property
+    def translation(self) -> AnyArray:
+        """Return (3,) the centre."""
+        ...
+
+    @property
+    def rotation_xyzw(self) -> AnyArray:
+        """Return (4,) the quaternion."""
+        ...
+
+    @property
+    def size(self) -> AnyArray:
+        """Return (3,) the extents."""
+        ...
+
+
+def affine(pose: Pose, model: GenericModel) -> tuple[Float64Array, Float64Array]:
     """Return (A (3, 3), t (3,)): world = A x + t for points x of the generic model."""
     T_world_model = matrix_from_pose(pose.translation, pose.rotation_xyzw)
     scale = np.asarray(pose.size, np.float64) / np.maximum(model.extents, 1e-9)
     return T_world_model[:3, :3] * scale, T_world_model[:3, 3]
 
 
-def world_mesh(pose, model):
+def world_mesh(pose: Pose, model: GenericModel) -> tuple[Float64Array, Int32Array]:
     """Return (vertices (V, 3) float64 world, faces) of the model as posed and sized."""
     A, t = affine(pose, model)
     return model.vertices @ A.T + t, model.faces
 
 
-@functools.lru_cache(maxsize=256)
-def _hull_of(key):
-    vertices = key.model.vertices
-    try:
-        return vertices[ConvexHull(vertices).vertices]
-    except (QhullError, ValueError):  # a flat model
-        return vertices
-
-
-class _ByIdentity:
-    """Key of the hull cache: the arrays of a model cannot be hashed, the object can."""
-
-    def __init__(self, model):
-        self.model = model
-
-    def __hash__(self):
-        return id(self.model)
-
-    def __eq__(self, other):
-        return self.model is other.model
-
-
-def hull(model):
+@per_model
+def hull(model: GenericModel) -> Float64Array:
     """Return (n, 3) the vertices of the model's convex hull."""
-    return _hull_of(_ByIdentity(model))
+    try:
+        return model.vertices[ConvexHull(model.vertices).vertices]
+    except (QhullError, ValueError):  # a flat model
+        return model.vertices
 
 
-def diameter(pose, model):
+def diameter(pose: Pose, model: GenericModel) -> float:
     """Return the largest distance, metres, between two points of the model at this size."""
     points = hull(model) * (np.asarray(pose.size) / np.maximum(model.extents, 1e-9))
     return float(pdist(points).max())
 
 
-def _symmetries(est, true, model):
-    """Return the (n, 3, 3) symmetries to try; a ball's are those that bring est onto true."""
+def _symmetries(est: Pose, true: Pose, model: GenericModel) -> Float64Array:
+    """Return the (n, 3, 3) symmetries to try; for a ball the one that maps true onto est."""
     if is_ball(model.symmetry):
         R_est = matrix_from_pose(est.translation, est.rotation_xyzw)[:3, :3]
         R_true = matrix_from_pose(true.translation, true.rotation_xyzw)[:3, :3]
@@ -78,14 +89,12 @@ def _symmetries(est, true, model):
     return symmetry_rotations(model.symmetry)
 
 
-def mssd(est, true, model):
+def mssd(est: Pose, true: Pose, model: GenericModel) -> float:
     """
     Return the Maximum Symmetry-Aware Surface Distance, metres.
 
     min over symmetries S of max over model points x of |est(x) - true(S x)|. The distance is
     convex in x, so the vertices of the convex hull suffice.
-
-    :param est: anything with translation (3,), rotation_xyzw (4,), size (3,), as `true`.
     """
     points = hull(model)
     (A_est, t_est), (A_true, t_true) = affine(est, model), affine(true, model)
@@ -94,7 +103,7 @@ def mssd(est, true, model):
     return float(np.sqrt((gap ** 2).sum(-1).max(1).min()))
 
 
-def mspd(est, true, model, camera):
+def mspd(est: Pose, true: Pose, model: GenericModel, camera: Camera) -> float:
     """
     Return the Maximum Symmetry-Aware Projection Distance in a rectified camera, pixels.
 
@@ -106,7 +115,8 @@ def mspd(est, true, model, camera):
     R, t = camera.T_world_camera[:3, :3], camera.T_world_camera[:3, 3]
     (A_est, t_est), (A_true, t_true) = affine(est, model), affine(true, model)
 
-    def pixels(A, shift):
+    def pixels(A: Float64Array, shift: Float64Array) -> Float64Array:
+        """Return (..., 2) pixel coordinates, NaN where a point lies behind the camera."""
         in_camera = (points @ A.swapaxes(-1, -2) + shift - t) @ R
         z = in_camera[..., 2:]
         if (z <= 0).any():
@@ -119,14 +129,15 @@ def mspd(est, true, model, camera):
     return float(np.sqrt((gap ** 2).sum(-1).max(1).min()))
 
 
-def _distance(depth, camera):
-    """Return the (H, W) distances from the camera's centre for depths along its axis."""
+def _distance(depth: Float32Array, camera: Camera) -> Float64Array:
+    """Return the (H, W) distances from the camera centre for depths along its axis."""
     u, v = np.meshgrid(np.arange(depth.shape[1]), np.arange(depth.shape[0]))
     x, y = (u - camera.K[0, 2]) / camera.K[0, 0], (v - camera.K[1, 2]) / camera.K[1, 1]
     return depth * np.sqrt(x * x + y * y + 1)
 
 
-def vsd(est, true, model, view, taus, delta=VSD_DELTA_M):
+def vsd(est: Pose, true: Pose, model: GenericModel, view: RectifiedView | ObservedView,
+        taus: Sequence[float] | Float64Array, delta: float = VSD_DELTA_M) -> Float64Array:
     """
     Return (len(taus),) the Visible Surface Discrepancy for each tolerance, each in [0, 1].
 

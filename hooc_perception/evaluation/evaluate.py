@@ -1,25 +1,28 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Score a results file against a scene set: everything that the tables are made of."""
+"""Score a results file against a scene set: all figures that the tables show."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.rectify import rectified_numbers, rectify
 from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
-from hooc_perception.evaluation.bop import bop_score
-from hooc_perception.evaluation.masks import score_masks
-from hooc_perception.evaluation.matching import in_frame_of, posed
-from hooc_perception.evaluation.scores import per_category, score_scene
-from hooc_perception.evaluation.visibility import scene_visibility
+from hooc_perception.evaluation.bop import bop_score, BopScene, BopScore
+from hooc_perception.evaluation.masks import MaskScore, score_masks
+from hooc_perception.evaluation.matching import in_frame_of, posed, PosedObject
+from hooc_perception.evaluation.scores import per_category, SceneScore, score_scene
+from hooc_perception.evaluation.visibility import scene_visibility, Visibility
+from hooc_perception.io.scenes.scene_set import RecordedScene, SceneSet
 from hooc_perception.objects.mesh import load_mesh
 from hooc_perception.objects.repair import closed
 from hooc_perception.objects.symmetry import axis_symmetry
 import numpy as np
 
-# Scores look at all of an image; what the chain leaves out as too far is its own business.
+# Scores use the whole image, including readings that the chain ignores as too far away.
 RECTIFY = ObserveConfig(max_depth_m=20.0)
 
 
@@ -28,35 +31,35 @@ class Evaluation:
     """
     A results file with its scores.
 
-    :ivar label: what the tables call it.
+    :ivar label: its name in the tables.
     :ivar setting: 'A', or 'B' where the true poses were among the candidates.
-    :ivar scores: tuple of SceneScore of the scenes with poses.
-    :ivar masks: tuple of MaskScore of the scenes with labels only.
-    :ivar estimates: {scene: list of PosedObject}.
-    :ivar energy: {scene: {total, depth, probability, overlap}} as the results say.
-    :ivar bop: BopScore, or None where it was not asked for.
+    :ivar scores: of the scenes with poses.
+    :ivar masks: of the scenes with labels only.
+    :ivar estimates: {scene: objects}.
+    :ivar energy: {scene: {total, depth, probability, overlap}} from the results.
+    :ivar bop: None where it was not computed.
     """
 
     label: str
     setting: str
-    scores: tuple
-    masks: tuple
-    estimates: dict
-    energy: dict = field(default_factory=dict)
-    bop: object = None
+    scores: tuple[SceneScore, ...]
+    masks: tuple[MaskScore, ...]
+    estimates: dict[str, list[PosedObject]]
+    energy: dict[str, dict[str, float | None]] = field(default_factory=dict)
+    bop: BopScore | None = None
 
-    def per_category(self, categories):
+    def per_category(self, categories: Iterable[str]) -> dict[str, dict[str, Any]]:
         """Return `scores.per_category` of all scenes with poses."""
         return per_category(self.scores, [self.estimates.get(s.name, []) for s in self.scores],
                             categories)
 
 
-def scoring_models(scene_set, seed=0):
+def scoring_models(scene_set: SceneSet, seed: int = 0) -> dict[str, GenericModel]:
     """
     Return {category: GenericModel} of a set's meshes, with shape, extents and symmetry only.
 
-    The samples and resting poses, which scores do not use, are empty: this takes a fraction of
-    the time of deriving all.
+    Samples and resting poses, which scores do not use, are empty: this takes a fraction of the
+    time of deriving everything.
     """
     none = np.zeros((0, 3), np.float32)
     out = {}
@@ -70,33 +73,38 @@ def scoring_models(scene_set, seed=0):
     return out
 
 
-def table_1(scene_set, models, seed=0):
+def table_1(scene_set: SceneSet, models: Mapping[str, GenericModel],
+            seed: int = 0) -> dict[str, list[Visibility]]:
     """Return {scene: [Visibility]} of every annotated scene."""
     return {scene.name: scene_visibility([posed(t) for t in scene.truth], models, scene.cameras,
                                          stage_rng(seed, 'visibility'))
             for scene in scene_set.scenes if scene.truth}
 
 
-def evaluate_results(scene_set, results, models, label='', visibility=None):
+def evaluate_results(scene_set: SceneSet, results: Mapping[str, Any],
+                     models: Mapping[str, GenericModel], label: str = '',
+                     visibility: Mapping[str, list[Visibility]] | None = None) -> Evaluation:
     """
     Return the Evaluation of one results file.
 
-    Scenes that the results do not hold count as empty answers; results of scenes that the set
-    does not hold are left out.
+    Scenes that are missing in the results count as empty; results of scenes that are not in the
+    set are ignored.
 
     :param results: content of a results file (`scenes.results.load_results`).
     :param models: {category: GenericModel}, see `scoring_models`.
-    :param visibility: {scene: [Visibility]} from `table_1`; given, BOP's recalls are computed.
+    :param visibility: {scene: [Visibility]} from `table_1`: also compute BOP's recalls.
     :raises HoocError: where an estimate names a category that the set does not list.
     """
     by_name = {entry['scene']: entry for entry in results['scenes']}
-    scores, masks, estimates, energy, targets = [], [], {}, {}, []
+    scores, masks, targets = [], [], []
+    estimates: dict[str, list[PosedObject]] = {}
+    energy: dict[str, dict[str, float | None]] = {}
     for scene in scene_set.scenes:
         entry = by_name.get(scene.name)
         found = ([posed(o) for o in in_frame_of(scene, entry)['objects']] if entry else [])
         for unknown in (o.category for o in found if o.category not in models):
-            raise HoocError(f'scene {scene.name} of the results holds a {unknown!r}, which '
-                            f'{scene_set.path} does not list; evaluate it against its own set')
+            raise HoocError(f'scene {scene.name} of the results contains a {unknown!r}, '
+                            f'which {scene_set.path} does not list; evaluate it against its set')
         about = {'seconds': entry['seconds'] if entry else float('nan'), 'missing': not entry}
         estimates[scene.name] = found
         if entry and entry.get('energy'):
@@ -106,7 +114,8 @@ def evaluate_results(scene_set, results, models, label='', visibility=None):
             scores.append(score_scene(scene.name, found, truths, models, **about))
             if visibility and scene.name in visibility:
                 views = [rectify(view, RECTIFY) for view in scene.depth()]
-                targets.append((scores[-1], found, truths, views, visibility[scene.name], models))
+                targets.append(BopScene(scores[-1], found, truths, views,
+                                        visibility[scene.name], models))
         elif scene.label_files:
             masks.append(_masks(scene, found, models, about))
     setting = str(results.get('setting', 'A')).upper()
@@ -114,10 +123,11 @@ def evaluate_results(scene_set, results, models, label='', visibility=None):
                       bop_score(targets) if targets else None)
 
 
-def _masks(scene, found, models, about):
+def _masks(scene: RecordedScene, found: list[PosedObject], models: Mapping[str, GenericModel],
+           about: dict[str, Any]) -> MaskScore:
     """Return the MaskScore of a scene with instance labels."""
     raw = {view.camera.name: view for view in scene.depth()}
     labels = {name: rectified_numbers(image, raw[name].camera)
-              for name, image in scene.labels().items()}
+              for name, image in (scene.labels() or {}).items()}
     views = [rectify(view, RECTIFY) for view in raw.values()]
     return score_masks(scene.name, found, models, views, labels, **about)

@@ -2,10 +2,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores by masks, for recordings with instance labels but without poses."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from hooc_perception.core.arrays import AnyArray, BoolArray, Float64Array, Int64Array, UInt8Array
 from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import GenericModel, RectifiedView
 from hooc_perception.evaluation.errors import world_mesh
+from hooc_perception.evaluation.matching import PosedObject
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
@@ -20,7 +24,7 @@ class MaskScore:
 
     :ivar explained: number of labelled objects with a partner of IoU >= 0.5.
     :ivar labelled: number of labelled objects of more than 150 pixels.
-    :ivar estimated: number of estimates, once a labelled view.
+    :ivar estimated: number of estimates, counted once per labelled view.
     :ivar iou: IoU of every labelled object with its partner, 0 where it has none.
     """
 
@@ -28,16 +32,17 @@ class MaskScore:
     explained: int
     labelled: int
     estimated: int
-    iou: tuple
+    iou: tuple[float, ...]
     seconds: float = float('nan')
     missing: bool = False
 
 
-def match_masks(estimated_ids, n_estimates, labels, valid):
+def match_masks(estimated_ids: AnyArray, n_estimates: int, labels: AnyArray,
+                valid: BoolArray) -> tuple[list[int], Int64Array, Float64Array]:
     """
-    Return (label values, best partner or -1, IoU), one to one, of one view.
+    Return (label values, matched estimate or -1, IoU), one to one, of one view.
 
-    :param estimated_ids: (H, W) int, the estimate seen at a pixel, -1 none.
+    :param estimated_ids: (H, W) int, the estimate visible at a pixel, -1 none.
     :param labels: (H, W) integers, 0 none.
     :param valid: (H, W) bool, pixels with a reading; all others are left out.
     """
@@ -57,17 +62,19 @@ def match_masks(estimated_ids, n_estimates, labels, valid):
     return values, partner, best
 
 
-def score_masks(name, estimates, models, views, labels, seconds=float('nan'), missing=False):
+def score_masks(name: str, estimates: Sequence[PosedObject], models: Mapping[str, GenericModel],
+                views: Sequence[RectifiedView], labels: Mapping[str, UInt8Array],
+                seconds: float = float('nan'), missing: bool = False) -> MaskScore:
     """
     Return the MaskScore of a scene.
 
-    :param estimates: sequence of PosedObject; each model is rendered at its estimated size.
+    :param estimates: each model is rendered at its estimated size.
     :param views: RectifiedViews whose camera is that of the labels.
     :param labels: mapping camera name -> (H, W) uint8 instance labels, rectified too.
     """
     meshes = [world_mesh(e, models[e.category]) for e in estimates]
     explained = labelled = estimated = 0
-    ious = []
+    ious: list[float] = []
     for view in views:
         if view.camera.name not in labels:
             continue

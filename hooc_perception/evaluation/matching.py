@@ -1,9 +1,12 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Which estimate stands for which true object: one to one within a category."""
+"""Which estimate belongs to which true object: one to one within a category."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import inverse, matrix_from_pose, pose_from_matrix
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -19,38 +22,39 @@ class PosedObject:
     :ivar rotation_xyzw: (4,) unit quaternion, model axes to world.
     :ivar size: (3,) extents along the model axes, metres.
     :ivar score: of an estimate; 1 for a true object.
-    :ivar sigma_t, sigma_r: of an estimate, metres and radians; NaN where nobody says.
+    :ivar sigma_t, sigma_r: of an estimate, metres and radians; NaN where unknown.
     """
 
     category: str
-    translation: np.ndarray
-    rotation_xyzw: np.ndarray
-    size: np.ndarray
+    translation: Float64Array
+    rotation_xyzw: Float64Array
+    size: Float64Array
     score: float = 1.0
     sigma_t: float = float('nan')
     sigma_r: float = float('nan')
 
 
-def posed(thing):
+def posed(thing: Any) -> PosedObject:
     """Return a PosedObject of a results entry (a mapping) or of a TrueObject."""
-    get = thing.get if isinstance(thing, dict) else lambda k, d=None: getattr(thing, k, d)
+    get = thing.get if isinstance(thing, dict) else lambda k: getattr(thing, k, None)
+    score, *sigmas = (get(name) for name in ('score', 'sigma_t', 'sigma_r'))
     try:
         rotation = np.asarray(get('rotation_xyzw'), np.float64).reshape(4)
         return PosedObject(str(get('category')),
                            np.asarray(get('translation'), np.float64).reshape(3),
                            rotation / np.linalg.norm(rotation),
                            np.asarray(get('size'), np.float64).reshape(3),
-                           1.0 if get('score') is None else float(get('score')),
-                           *(float('nan') if get(name) is None else float(get(name))
-                             for name in ('sigma_t', 'sigma_r')))
+                           1.0 if score is None else float(score),
+                           *(float('nan') if sigma is None else float(sigma)
+                             for sigma in sigmas))
     except (TypeError, ValueError) as error:
         raise HoocError(f'object {get("category")!r} has no usable pose: {error}; give '
                         'translation (3), rotation_xyzw (4) and size (3)') from None
 
 
-def in_frame_of(scene, entry):
+def in_frame_of(scene: Any, entry: dict[str, Any]) -> dict[str, Any]:
     """
-    Return a results entry (dict) with its objects in the table frame of a RecordedScene.
+    Return a results entry with its objects in the table frame of a RecordedScene or BagScene.
 
     Where the world is not known to be a table's, the frame is estimated, and the results say
     which one they used; another version may estimate another, so both are compared in the
@@ -70,14 +74,13 @@ def in_frame_of(scene, entry):
     return entry | {'objects': objects, **scene.world}
 
 
-def match_by_centre(estimates, truths):
+def match_by_centre(estimates: Sequence[PosedObject],
+                    truths: Sequence[PosedObject]) -> list[tuple[int, int, float]]:
     """
     Return [(i_est, i_true, metres)], one to one within each category.
 
     The Hungarian method on the distance between centres, as many pairs as the category allows;
     the distance does not limit the pairing, so that errors of badly placed objects show.
-
-    :param estimates: sequence of PosedObject, as `truths`.
     """
     pairs = []
     for category in dict.fromkeys(t.category for t in truths):

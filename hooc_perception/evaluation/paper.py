@@ -1,11 +1,11 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The figures that Basevi & Leonardis (2016) print for HOOC, to stand beside ours."""
+"""The figures that Basevi & Leonardis (2016) report for HOOC, to compare with."""
 
 SCENES = ('10(1)', '10(2)', '10(3)', '10(4)', '10(5)', '20(1)', '20(2)', '20(3)', '20(4)')
 
 # Tables 2 (setting A) and 3 (setting B, true poses in the pool).
-SCORES = {
+SCORES: dict[str, dict[str, tuple[float, ...]]] = {
     'A': {'found': (.40, .50, .33, .50, .33, .47, .56, .44, .44),
           'localized': (.20, .50, .22, .50, .22, .32, .22, .28, .17),
           'false_categories': (5, 8, 2, 5, 7, 1, 1, 2, 2)},
@@ -47,7 +47,7 @@ VISIBILITY = {
 }
 
 
-def mean(setting, name):
+def mean(setting: str, name: str) -> float:
     """Return the mean over the nine HOOC scenes of a column of SCORES."""
     values = SCORES[setting][name]
     return sum(values) / len(values)

@@ -2,65 +2,71 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's four tables and the stricter scores, as Table records."""
 
+from collections.abc import Iterable, Mapping, Sequence
+
+from hooc_perception.core.types import Energy
 from hooc_perception.evaluation import paper
+from hooc_perception.evaluation.evaluate import Evaluation
 from hooc_perception.evaluation.scores import means, pose_errors
-from hooc_perception.evaluation.tables import Table
+from hooc_perception.evaluation.tables import Cell, Table
+from hooc_perception.evaluation.visibility import Visibility
 import numpy as np
 
 TERMS = ('total', 'depth', 'probability', 'overlap')
 
 
-def _tag(k, evaluations):
-    """Return what marks the columns of result k: nothing where there is one result only."""
+def _tag(k: int, evaluations: Sequence[Evaluation]) -> str:
+    """Return the mark of the columns of result k, '' where there is one result only."""
     return f'[{k + 1}] ' if len(evaluations) > 1 else ''
 
 
-def _legend(evaluations):
-    """Return the note that says what the marks mean, [] where there are none."""
+def _legend(evaluations: Sequence[Evaluation]) -> list[str]:
+    """Return the note that explains the marks, [] where there are none."""
     if len(evaluations) < 2:
         return []
     return [', '.join(f'[{k + 1}] {e.label}' for k, e in enumerate(evaluations))]
 
 
-def score_table(evaluations, setting):
+def score_table(evaluations: Sequence[Evaluation], setting: str) -> Table | None:
     """
     Return Table 2 (setting 'A') or Table 3 ('B') of the evaluations, None where there are none.
 
-    A block of columns for each results file; the last row is the paper's mean on HOOC, which
-    is another set of scenes.
+    A block of columns per results file; the last row is the paper's mean on HOOC, which is
+    another set of scenes.
     """
     chosen = [e for e in evaluations if e.setting == setting and e.scores]
     if not chosen:
         return None
     columns = ('found', 'local', '< 2 cm', 'false', 'n', 's')
     header = ['scene', *(_tag(k, chosen) + c for k in range(len(chosen)) for c in columns)]
-    rows, notes = [], _legend(chosen)
+    rows: list[tuple[Cell, ...]] = []
+    notes = _legend(chosen)
     for k, first in enumerate(chosen[0].scores):
-        row = [first.name]
+        row: list[Cell] = [first.name]
         for e in chosen:
             s = e.scores[k]
             row += [s.found, s.localized, s.tight, s.false_categories, s.estimated, s.seconds]
             if s.missing:
                 notes.append(f'{e.label or "results"}: scene {s.name} is missing and counts as '
                              'empty.')
-        rows.append(row)
-    total = ['mean']
+        rows.append(tuple(row))
+    total: list[Cell] = ['mean']
     for e in chosen:
         m = means(e.scores)
         total += [f'{m["found"]:.3f}', f'{m["localized"]:.3f}', f'{m["tight"]:.3f}',
                   m['false_categories'], f'{m["estimated"]:.1f}', m['seconds']]
-    beside = ['paper, HOOC mean'] + [
+    beside: list[Cell] = ['paper, HOOC mean', *(
         paper.mean(setting, 'found'), paper.mean(setting, 'localized'), None,
-        paper.mean(setting, 'false_categories'), None, None] * len(chosen)
+        paper.mean(setting, 'false_categories'), None, None) * len(chosen)]
     title = {'A': 'Table 2: the full chain',
              'B': 'Table 3: parsing with the true poses among the candidates'}[setting]
-    return Table(title, tuple(header), (*map(tuple, rows), tuple(total), tuple(beside)),
+    return Table(title, tuple(header), (*rows, tuple(total), tuple(beside)),
                  tuple(notes), (len(rows), len(rows) + 1))
 
 
-def paper_scores():
+def paper_scores() -> Table:
     """Return the paper's own Tables 2 and 3, scene by scene."""
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
     for setting, table in (('A', 2), ('B', 3)):
         for name, title in (('found', 'found'), ('localized', 'localized'),
                             ('false_categories', 'false categories')):
@@ -70,7 +76,7 @@ def paper_scores():
     return Table("The paper's own figures on HOOC", ('', *paper.SCENES, 'mean'), tuple(rows))
 
 
-def visibility_table(name, rows):
+def visibility_table(name: str, rows: Sequence[Visibility]) -> Table:
     """Return Table 1 of one scene from its [Visibility]."""
     n = len(rows[0].pixels)
     header = ('object', *(f'pixels {j + 1}' for j in range(n)),
@@ -82,23 +88,23 @@ def visibility_table(name, rows):
                  (len(body),))
 
 
-def visibility_summary(visibility):
-    """Return Table 1 in short: one row a scene, from {scene: [Visibility]}."""
+def visibility_summary(visibility: Mapping[str, Sequence[Visibility]]) -> Table:
+    """Return Table 1 in short: one row per scene, from {scene: [Visibility]}."""
     rows = []
     for name, objects in visibility.items():
         pixels = np.concatenate([v.pixels for v in objects])
         total = np.array([v.total for v in objects])
         rows.append((name, len(objects), float(np.nanmean(pixels)), float(np.nanmin(pixels)),
                      float(total.mean()), float(total.min()), float(total.max())))
-    return Table('Table 1 in short: what can be seen of the true objects',
+    return Table('Table 1 in short: visibility of the true objects',
                  ('scene', 'objects', 'pixels, mean', 'least', 'surface, mean', 'least', 'most'),
-                 tuple(rows), ("pixels: share of an object's pixels still visible among the "
-                               'others, over objects and views; surface: share of its surface '
-                               'that some camera sees. HOOC 20(1): pixels .32-1.00, surface '
-                               '.39-.71. The whole table: --visibility.',))
+                 tuple(rows), ("pixels: share of an object's own pixels that the others "
+                               'leave visible, over objects and views; surface: share of its '
+                               'surface that some camera sees. HOOC 20(1): pixels .32-1.00, '
+                               'surface .39-.71. In full: hooc evaluate SET.',))
 
 
-def paper_visibility():
+def paper_visibility() -> Table:
     """Return the paper's Table 1, scene 20(1) of HOOC."""
     return Table("The paper's Table 1: HOOC scene 20(1)",
                  ('object', *(f'pixels {j}' for j in (1, 2, 3)),
@@ -106,11 +112,12 @@ def paper_visibility():
                  tuple((name, *values) for name, values in paper.VISIBILITY.items()))
 
 
-def energy_table(evaluations, truth=None):
+def energy_table(evaluations: Sequence[Evaluation],
+                 truth: Mapping[str, Energy] | None = None) -> Table | None:
     """
     Return Table 4: Eq. 1 and its terms for settings A, B and the truth; None without energies.
 
-    :param truth: {scene: Energy} of the true sets, or None where no model was given.
+    :param truth: {scene: Energy} of the true poses, None or empty where no model was given.
     """
     chosen = [e for e in evaluations if e.energy]
     sources = [((_tag(k, chosen) or 'answer ').strip(), e.energy)
@@ -123,28 +130,27 @@ def energy_table(evaluations, truth=None):
     names = list(dict.fromkeys(name for _, energies in sources for name in energies))
     header = ('scene', *(f'{label} {term}' for term in TERMS for label, _ in sources))
 
-    def value(energies, name, term):
+    def value(energies: Mapping[str, Mapping[str, float | None]], name: str, term: str) -> float:
         number = energies.get(name, {}).get(term)
-        return None if number is None else float(number)
+        return np.nan if number is None else float(number)
 
-    rows = [[name, *(value(energies, name, term) for term in TERMS for _, energies in sources)]
-            for name in names]
-    columns = np.array([[np.nan if v is None else v for v in row[1:]] for row in rows]).T
-    total = ['mean', *(float(np.nanmean(c)) if np.isfinite(c).any() else None for c in columns)]
+    values = np.array([[value(energies, name, term) for term in TERMS for _, energies in sources]
+                       for name in names])
+    total = [float(np.nanmean(c)) if np.isfinite(c).any() else np.nan for c in values.T]
     notes = _legend(chosen) + ["The paper's means on HOOC: " + '; '.join(
         f'{label} ' + ' '.join(f'{v:.3f}' for v in np.mean(paper.ENERGY[label], axis=0))
         for label in ('A', 'B', 'truth')) + ' (total, depth, probability, overlap).']
     if not truth:
-        notes.append("The truth's energy needs the classifier: give the model with --model.")
-    texts = [[row[0], *(None if v is None else f'{v:.4f}' for v in row[1:])]
-             for row in (*rows, total)]
-    return Table('Table 4: energy (Eq. 1) of the answers', header, tuple(map(tuple, texts)),
-                 tuple(notes), (len(rows),))
+        notes.append('The energy of the true poses needs the classifier: name it with --model.')
+    rows = [(name, *(None if np.isnan(v) else f'{v:.4f}' for v in row))
+            for name, row in zip((*names, 'mean'), (*values, total))]
+    return Table('Table 4: energy (Eq. 1) of the results', header, tuple(rows), tuple(notes),
+                 (len(names),))
 
 
-def strict_table(evaluations):
-    """Return the stricter scores, one row a results file; None where no scene has poses."""
-    rows = []
+def strict_table(evaluations: Sequence[Evaluation]) -> Table | None:
+    """Return the stricter scores, one row per results file; None where no scene has poses."""
+    rows: list[tuple[Cell, ...]] = []
     for e in evaluations:
         if not e.scores:
             continue
@@ -165,13 +171,14 @@ def strict_table(evaluations):
               'AR MSSD', 'AR MSPD', 'AR')
     return Table('Stricter scores', header, tuple(rows),
                  ('mm, deg: median errors of the localized objects, rotation up to the '
-                  "model's symmetry; < 15 deg: share of all true objects that are localized and "
-                  'turned right; size: median ratio, estimated to true; AR: BOP average recall.',))
+                  "model's symmetry; < 15 deg: share of all true objects that are localized with "
+                  'a rotation error below 15 degrees; size: median ratio of estimated to true '
+                  'size; AR: BOP average recall.',))
 
 
-def category_table(evaluation, categories):
+def category_table(evaluation: Evaluation, categories: Iterable[str]) -> Table:
     """Return the per-category breakdown of one results file."""
-    rows = []
+    rows: list[tuple[Cell, ...]] = []
     for name, c in evaluation.per_category(categories).items():
         if c['true'] or c['estimated']:
             rows.append((name, c['true'], c['estimated'], c['found'], c['localized'], c['tight'],
@@ -183,13 +190,14 @@ def category_table(evaluation, categories):
                                           '< 2 cm', 'mm', 'deg'), tuple(rows))
 
 
-def mask_table(evaluation):
+def mask_table(evaluation: Evaluation) -> Table | None:
     """Return the mask scores of one results file; None where no scene has labels alone."""
     masks = evaluation.masks
     if not masks:
         return None
-    rows = [(m.name, f'{m.explained}/{m.labelled}', m.estimated,
-             float(np.mean(m.iou)) if m.iou else None, m.seconds) for m in masks]
+    rows: list[tuple[Cell, ...]] = [
+        (m.name, f'{m.explained}/{m.labelled}', m.estimated,
+         float(np.mean(m.iou)) if m.iou else None, m.seconds) for m in masks]
     explained, labelled, estimated = (sum(getattr(m, k) for m in masks)
                                       for k in ('explained', 'labelled', 'estimated'))
     seconds = [m.seconds for m in masks if np.isfinite(m.seconds)]

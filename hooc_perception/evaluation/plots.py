@@ -1,19 +1,24 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Pictures of the scores: bars per category and how the errors are distributed."""
+"""Plots of the scores: bars per category and the distribution of the errors."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from hooc_perception.evaluation.certainty import reliability, sigma_errors, verdicts
-from hooc_perception.evaluation.scores import pose_errors
+from hooc_perception.evaluation.evaluate import Evaluation
+from hooc_perception.evaluation.scores import pose_errors, SceneScore
 import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 import numpy as np
 
 COLOURS = ('#3b6fb6', '#d9822b', '#3f9b62', '#b5495b', '#7b5ea7', '#6b7280')
 
 
-def _axes(width, height, n=1):
+def _axes(width: float, height: float, n: int = 1) -> tuple[Figure, Sequence[Axes]]:
+    """Return a figure of this size in inches and its n axes side by side."""
     with matplotlib.rc_context({'font.size': 9}):
         figure = Figure(figsize=(width, height), layout='constrained')
         axes = figure.subplots(1, n, squeeze=False)[0]
@@ -22,11 +27,12 @@ def _axes(width, height, n=1):
     return figure, axes
 
 
-def category_bars(named, categories, path):
+def category_bars(named: Sequence[tuple[str, Mapping[str, Any]]], categories: Iterable[str],
+                  path: str | Path) -> None:
     """
     Draw the share of true objects that are localized, a group of bars per category.
 
-    :param named: sequence of (label, {category: dict as from `scores.per_category`}).
+    :param named: (label, {category: dict as from `scores.per_category`}) of each result.
     :param path: PNG file to write.
     """
     shown = [c for c in categories if any(table[c]['true'] for _, table in named)]
@@ -48,13 +54,13 @@ def category_bars(named, categories, path):
     figure.savefig(path, dpi=130)
 
 
-def error_curves(named, path):
+def error_curves(named: Sequence[tuple[str, Sequence[SceneScore]]], path: str | Path) -> None:
     """
-    Draw the share of all true objects below an error, over the error: centre and rotation.
+    Plot the share of all true objects below an error over the error: centre and rotation.
 
-    Objects that were not found never get below any, so the curves end at the found share.
+    Objects that were not found are below no error, so the curves end at the found share.
 
-    :param named: sequence of (label, [SceneScore]).
+    :param named: (label, scores) of each result.
     """
     figure, axes = _axes(9.0, 3.4, 2)
     for k, (label, scores) in enumerate(named):
@@ -76,12 +82,12 @@ def error_curves(named, path):
     figure.savefig(path, dpi=130)
 
 
-def certainty_plot(evaluations, path):
+def certainty_plot(evaluations: Sequence[Evaluation], path: str | Path) -> None:
     """
-    Draw scores against the share that is right, and errors against sigmas.
+    Plot the share of right estimates over scores, and errors over sigmas.
 
-    :param evaluations: sequence of Evaluation; those without sigmas are left out of the second
-        picture, and where none has any it is left out itself.
+    :param evaluations: those without sigmas are left out of the second plot, which is omitted
+        where none has any.
     """
     sigmas = [sigma_errors(e)['t'] * 1000 for e in evaluations]
     n = 2 if any(map(len, sigmas)) else 1
@@ -91,7 +97,7 @@ def certainty_plot(evaluations, path):
         bins = np.array(reliability(*verdicts(e)), float).reshape(-1, 5)
         colour = COLOURS[k % len(COLOURS)]
         if len(bins):
-            # Where the true share lies, two to one, given so few.
+            # One standard deviation of the share, given so few estimates.
             error = np.sqrt((bins[:, 4] * bins[:, 2] + 1) * ((1 - bins[:, 4]) * bins[:, 2] + 1)
                             / (bins[:, 2] + 2) ** 2 / (bins[:, 2] + 3))
             share = bins[:, 4]
@@ -112,19 +118,14 @@ def certainty_plot(evaluations, path):
     figure.savefig(path, dpi=130)
 
 
-def write_plots(folder, named, categories, evaluations=()):
-    """
-    Write categories.png and errors.png into a folder; return their paths.
-
-    :param named: sequence of (label, [SceneScore], per-category table).
-    :param evaluations: sequence of Evaluation: also write certainty.png.
-    """
+def write_plots(folder: str | Path, evaluations: Sequence[Evaluation],
+                categories: Sequence[str]) -> list[Path]:
+    """Write categories.png, errors.png and certainty.png into a folder; return their paths."""
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    category_bars([(label, table) for label, _, table in named], categories,
-                  folder / 'categories.png')
-    error_curves([(label, scores) for label, scores, _ in named], folder / 'errors.png')
-    if evaluations:
-        certainty_plot(evaluations, folder / 'certainty.png')
-    names = ('categories.png', 'errors.png') + (('certainty.png',) if evaluations else ())
-    return [folder / name for name in names]
+    paths = [folder / name for name in ('categories.png', 'errors.png', 'certainty.png')]
+    category_bars([(e.label, e.per_category(categories)) for e in evaluations], categories,
+                  paths[0])
+    error_curves([(e.label, e.scores) for e in evaluations], paths[1])
+    certainty_plot(evaluations, paths[2])
+    return paths

@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The paper's scores of a scene (section 6) and stricter ones."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import matrix_from_pose
 from hooc_perception.core.symmetry import rotation_error
-from hooc_perception.evaluation.matching import match_by_centre
+from hooc_perception.core.types import GenericModel
+from hooc_perception.evaluation.matching import match_by_centre, PosedObject
 import numpy as np
 
 TIGHT_M = 0.02
@@ -15,9 +19,10 @@ TIGHT_M = 0.02
 @dataclass(frozen=True)
 class ObjectScore:
     """
-    One true object and what stands for it.
+    One true object and the estimate that is matched to it.
 
-    :ivar estimate: index of the estimate of its category, None where there is none.
+    :ivar truth: index of the true object; `estimate` that of its estimate, None where there is
+        none.
     :ivar centre_m: distance between the centres; NaN without an estimate, as the next.
     :ivar rotation_rad: least angle over the model's symmetries.
     :ivar size_ratio: estimated over true length of the bounding box's diagonal.
@@ -32,7 +37,7 @@ class ObjectScore:
     size_ratio: float = float('nan')
 
     @property
-    def tight(self):
+    def tight(self) -> bool:
         """Return whether the centre is within 2 cm."""
         return self.centre_m < TIGHT_M
 
@@ -57,11 +62,12 @@ class SceneScore:
     false_categories: int
     estimated: int
     seconds: float
-    objects: tuple
+    objects: tuple[ObjectScore, ...]
     missing: bool = False
 
 
-def score_objects(estimates, truths, models):
+def score_objects(estimates: Sequence[PosedObject], truths: Sequence[PosedObject],
+                  models: Mapping[str, GenericModel]) -> list[ObjectScore]:
     """
     Return [ObjectScore] in the order of `truths`.
 
@@ -85,8 +91,10 @@ def score_objects(estimates, truths, models):
     return out
 
 
-def score_scene(name, estimates, truths, models, seconds=float('nan'), missing=False):
-    """Return the SceneScore of estimates against truths (sequences of PosedObject)."""
+def score_scene(name: str, estimates: Sequence[PosedObject], truths: Sequence[PosedObject],
+                models: Mapping[str, GenericModel], seconds: float = float('nan'),
+                missing: bool = False) -> SceneScore:
+    """Return the SceneScore of estimates against truths."""
     objects = score_objects(estimates, truths, models)
     n = len(truths) or float('nan')
     return SceneScore(
@@ -96,9 +104,9 @@ def score_scene(name, estimates, truths, models, seconds=float('nan'), missing=F
         len(estimates), float(seconds), tuple(objects), missing)
 
 
-def means(scores):
+def means(scores: Iterable[SceneScore]) -> dict[str, float]:
     """Return {field: mean over scenes} of the numeric fields; NaN entries are left out."""
-    out = {}
+    out, scores = {}, tuple(scores)
     for name in ('found', 'localized', 'tight', 'false_categories', 'estimated', 'seconds'):
         values = np.array([getattr(s, name) for s in scores], np.float64)
         values = values[np.isfinite(values)]
@@ -106,7 +114,7 @@ def means(scores):
     return out
 
 
-def pose_errors(scores):
+def pose_errors(scores: Iterable[SceneScore]) -> dict[str, Float64Array]:
     """
     Return {centre_m, rotation_rad, size_ratio}: float64 arrays over all matched objects.
 
@@ -117,14 +125,16 @@ def pose_errors(scores):
             for name in ('centre_m', 'rotation_rad', 'size_ratio')}
 
 
-def per_category(scores, estimates_by_scene, categories):
+def per_category(scores: Sequence[SceneScore],
+                 estimates_by_scene: Sequence[Sequence[PosedObject]],
+                 categories: Iterable[str]) -> dict[str, dict[str, Any]]:
     """
     Return {category: dict} of counts and median errors.
 
     The counts are true, estimated, found, localized, tight; centre_m and rotation_rad are
     medians over the localized objects, None where there are none.
 
-    :param estimates_by_scene: sequence of sequences of PosedObject, in the order of `scores`.
+    :param estimates_by_scene: in the order of `scores`.
     """
     out = {}
     for category in categories:

@@ -2,13 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables of what the stages lose, by scene and by category."""
 
-from hooc_perception.evaluation.stages import losses_by_category
+from collections.abc import Iterable
+
+from hooc_perception.evaluation.stages import Losses, losses_by_category
 from hooc_perception.evaluation.tables import Table
 import numpy as np
 
 
-def stage_table(losses):
-    """Return what each stage loses, one row a scene, from `rerun`."""
+def stage_table(losses: Losses) -> Table:
+    """Return what each stage loses, one row per scene, from `rerun`."""
     rows = []
     for name, loss in losses.items():
         pixels, pool, answer = loss['pixels'], loss['pool'], loss['answer']
@@ -24,13 +26,13 @@ def stage_table(losses):
                   'ranked 1st', 'kept', 'local', '< 2 cm'),
                  (*rows, mean),
                  ('pixels: share of the pixels on true objects whose most likely class is '
-                  'right, by class: the same averaged over the classes; in pool: share of the '
+                  'correct; by class: the same averaged over the classes; in pool: share of the '
                   "true objects with a candidate of their category within half the model's "
-                  'size; ranked 1st: those whose best-scored candidate is; kept: of those in the '
-                  'pool, the share that the answer localizes.',), (len(rows),))
+                  'size; ranked 1st: those whose best-scored candidate is one; kept: of those in '
+                  'the pool, the share that the result localizes.',), (len(rows),))
 
 
-def stage_category_table(losses, categories):
+def stage_category_table(losses: Losses, categories: Iterable[str]) -> Table:
     """Return what the stages lose of each category, the worst first, from `rerun`."""
     rows = []
     for name, c in losses_by_category(losses, categories).items():
@@ -42,5 +44,5 @@ def stage_category_table(losses, categories):
     return Table('What the stages lose, by category',
                  ('category', 'true', 'pixels', 'right', 'in pool', '< 2 cm', 'ranked 1st',
                   'local'), tuple(rows),
-                 ('pixels: certain pixels of all views, right: share of them whose most likely '
-                  'class is right; the rest counts objects.',))
+                 ('pixels: pixels of all views whose true class is certain; right: share of them '
+                  'whose most likely class is correct; the other columns count objects.',))

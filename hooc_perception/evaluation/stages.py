@@ -1,26 +1,38 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""What each stage loses: the classifier's pixels, the pool's poses, the search's choice."""
+"""What each stage loses: pixels of the classifier, poses of the pool, choice of the search."""
 
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
+from hooc_perception.core.arrays import Int32Array
 from hooc_perception.core.render import render_depth
-from hooc_perception.core.types import Candidates
+from hooc_perception.core.types import (
+    Candidates,
+    GenericModel,
+    Observation,
+    ObservedView,
+    PixelProbabilities,
+)
 from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.matching import PosedObject
-from hooc_perception.evaluation.scores import TIGHT_M
+from hooc_perception.evaluation.scores import SceneScore, TIGHT_M
 import numpy as np
 
-# A true object's generic model and the reading may differ this much: rough models.
+# A true object's generic model and the reading may differ this much: models are rough.
 AGREE_M = 0.03
+COUNTS = ('true', 'pixels', 'correct', 'near', 'tight', 'first', 'localized')
+# {scene: {pixels, pool, answer}} as `pixel_scores`, StageLoss and SceneScore.
+Losses: TypeAlias = Mapping[str, Mapping[str, Any]]
 
 
-def class_ids(models):
-    """Return {category name: class id} of a sequence of GenericModel."""
+def class_ids(models: Iterable[GenericModel]) -> dict[str, int]:
+    """Return {category name: class id}."""
     return {model.name: i + 1 for i, model in enumerate(models)}
 
 
-def as_candidates(objects, models):
+def as_candidates(objects: Iterable[PosedObject], models: Sequence[GenericModel]) -> Candidates:
     """Return PosedObjects as Candidates; categories without a model are left out."""
     ids = class_ids(models)
     kept = [o for o in objects if o.category in ids]
@@ -33,7 +45,7 @@ def as_candidates(objects, models):
                       np.array([o.score for o in kept], np.float32))
 
 
-def as_objects(candidates, models):
+def as_objects(candidates: Candidates, models: Sequence[GenericModel]) -> list[PosedObject]:
     """Return Candidates as a list of PosedObject."""
     return [PosedObject(models[int(c) - 1].name, candidates.translation[i],
                         candidates.rotation_xyzw[i], candidates.size[i].astype(np.float64),
@@ -41,16 +53,15 @@ def as_objects(candidates, models):
             for i, c in enumerate(candidates.category)]
 
 
-def true_classes(truths, models, view):
+def true_classes(truths: Iterable[PosedObject], models: Sequence[GenericModel],
+                 view: ObservedView) -> Int32Array:
     """
-    Return (H, W) int32: the class of the true object seen at a pixel, 0 none, -1 not certain.
+    Return (H, W) int32: the class of the true object seen at a pixel, 0 none, -1 uncertain.
 
     Certain are foreground pixels where the posed generic model agrees with the reading within
-    AGREE_M, and pixels that show no object and are no foreground.
+    AGREE_M, and background pixels that show no object.
 
-    :param truths: sequence of PosedObject.
-    :param models: sequence of GenericModel, class id c is models[c - 1].
-    :param view: ObservedView.
+    :param models: class id c is models[c - 1].
     """
     ids = class_ids(models)
     kept = [t for t in truths if t.category in ids]
@@ -65,7 +76,9 @@ def true_classes(truths, models, view):
     return classes
 
 
-def pixel_scores(probabilities, observation, truths, models):
+def pixel_scores(probabilities: PixelProbabilities, observation: Observation,
+                 truths: Sequence[PosedObject],
+                 models: Sequence[GenericModel]) -> dict[str, Any]:
     """
     Return the classifier's scores over all certain foreground pixels of a scene.
 
@@ -104,7 +117,7 @@ class StageLoss:
     :ivar pool_localized: some candidate of the category lies within half the model's size.
     :ivar pool_tight: some candidate of the category lies within 2 cm.
     :ivar first_localized: the best-scored candidate of the category lies within half the size.
-    :ivar kept: of the objects with a localized candidate, those localized in the answer.
+    :ivar kept: of the objects with a localized candidate, those localized in the result.
     :ivar candidates: number of candidates.
     :ivar objects: a dict (category, near, tight, first) of the same for every true object.
     """
@@ -114,16 +127,15 @@ class StageLoss:
     first_localized: float
     kept: float
     candidates: int
-    objects: tuple = ()
+    objects: tuple[dict[str, Any], ...] = ()
 
 
-def pool_recall(pool, truths, models, score=None):
+def pool_recall(pool: Candidates, truths: Sequence[PosedObject],
+                models: Sequence[GenericModel], score: SceneScore | None = None) -> StageLoss:
     """
-    Return the StageLoss of a pool of Candidates.
+    Return the StageLoss of a pool of candidates.
 
-    :param truths: sequence of PosedObject.
-    :param models: sequence of GenericModel.
-    :param score: SceneScore of the answer, for `kept`; NaN without one.
+    :param score: of the result, for `kept`; NaN without one.
     """
     ids = class_ids(models)
     near, tight, first = (np.zeros(len(truths), bool) for _ in range(3))
@@ -146,15 +158,14 @@ def pool_recall(pool, truths, models, score=None):
     return StageLoss(near.sum() / n, tight.sum() / n, first.sum() / n, kept, len(pool), objects)
 
 
-def losses_by_category(losses, categories):
+def losses_by_category(losses: Losses, categories: Iterable[str]) -> dict[str, dict[str, int]]:
     """
     Return {category: dict} of what the stages lose of each, from `rerun`'s losses.
 
-    The dict counts true objects, certain pixels and those rightly classified, objects with a
-    candidate near, within 2 cm, or ranked first, and objects localized in the answer.
+    The dict counts true objects, certain pixels and those classified correctly, objects with a
+    candidate near, within 2 cm, or ranked first, and objects localized in the result.
     """
-    out = {c: dict.fromkeys(('true', 'pixels', 'correct', 'near', 'tight', 'first', 'localized'),
-                            0) for c in categories}
+    out: dict[str, dict[str, int]] = {c: dict.fromkeys(COUNTS, 0) for c in categories}
     for loss in losses.values():
         for category, count in loss['pixels']['categories'].items():
             for key, n in count.items():

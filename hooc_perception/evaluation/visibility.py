@@ -2,11 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """How much of every true object can be seen at all (the paper's Table 1)."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+from hooc_perception.core.arrays import AnyArray, BoolArray, Float64Array, Int32Array
 from hooc_perception.core.kernels import raster
 from hooc_perception.core.render import projected, render_depth, render_patch
+from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.evaluation.errors import world_mesh
+from hooc_perception.evaluation.matching import PosedObject
 import numpy as np
 
 SAMPLES = 4000
@@ -29,13 +33,13 @@ class Visibility:
     """
 
     category: str
-    pixels: np.ndarray
-    surface: np.ndarray
+    pixels: Float64Array
+    surface: Float64Array
     total: float
 
 
-def _zoomed(camera):
-    """Return the camera with pixels ZOOM times finer, free of distortion."""
+def _zoomed(camera: Camera) -> Camera:
+    """Return the camera with ZOOM times the resolution, without distortion."""
     K = camera.K.astype(np.float64).copy()
     # The image's corner, not its first pixel's centre, stays where it is.
     K[:2, 2] = (K[:2, 2] + 0.5) * ZOOM - 0.5
@@ -44,7 +48,8 @@ def _zoomed(camera):
     return replace(camera, width=camera.width * ZOOM, height=camera.height * ZOOM, K=K)
 
 
-def surface_samples(vertices, faces, n, rng):
+def surface_samples(vertices: Float64Array, faces: Int32Array, n: int,
+                    rng: np.random.Generator) -> tuple[Float64Array, Float64Array]:
     """Return (points (n, 3), normals (n, 3)), uniform on a mesh's surface."""
     corners = vertices[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -58,7 +63,7 @@ def surface_samples(vertices, faces, n, rng):
             normals[chosen] / areas[chosen, None])
 
 
-def _edges_paired(faces):
+def _edges_paired(faces: Int32Array) -> bool:
     """Return whether every directed edge has its opposite: closed, wound one way."""
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]).astype(np.int64)
     n = edges.max() + 1
@@ -66,8 +71,8 @@ def _edges_paired(faces):
                           np.sort(edges[:, 1] * n + edges[:, 0]))
 
 
-def _outward(vertices, faces):
-    """Return +1 or -1 where normals point outward or inward, 0 where there is no inside."""
+def _outward(vertices: Float64Array, faces: Int32Array) -> int:
+    """Return +1 or -1 where normals point outward or inward, 0 where the mesh is open."""
     if not _edges_paired(faces):
         return 0
     corners = vertices[faces] - vertices.mean(0)
@@ -75,15 +80,15 @@ def _outward(vertices, faces):
                                  np.cross(corners[:, 1], corners[:, 2]))))
 
 
-def scene_visibility(objects, models, cameras, rng, samples=SAMPLES):
+def scene_visibility(objects: Sequence[PosedObject], models: Mapping[str, GenericModel],
+                     cameras: Sequence[Camera], rng: np.random.Generator,
+                     samples: int = SAMPLES) -> list[Visibility]:
     """
-    Return one Visibility an object, in order: Table 1 of a scene.
+    Return one Visibility per object, in order: Table 1 of a scene.
 
     Objects are the generic models, scaled to the true sizes, at the true poses; lens
-    distortion is left out, and so is the table, as the paper leaves it.
+    distortion is ignored, and so is the table, as in the paper.
 
-    :param objects: sequence of PosedObject or TrueObject.
-    :param models: mapping category name -> GenericModel.
     :param rng: draws the surface samples.
     """
     meshes = [world_mesh(o, models[o.category]) for o in objects]
@@ -104,8 +109,13 @@ def scene_visibility(objects, models, cameras, rng, samples=SAMPLES):
             for i, o in enumerate(objects)]
 
 
-def _sees(points, normals, outward, camera, depth, own):
-    """Return (n,) bool: the surface points that the camera sees in a composed rendering."""
+def _sees(points: Float64Array, normals: Float64Array, outward: int, camera: Camera,
+          depth: AnyArray, own: BoolArray) -> BoolArray:
+    """
+    Return (n,) bool: the surface points that the camera sees in a rendering of all objects.
+
+    :param depth: (H, W) of that rendering; `own` says where it shows the object.
+    """
     uvz = projected(points, camera)
     ahead = uvz[:, 2] > raster.NEAR_M
     u, v = np.rint(np.where(ahead[:, None], uvz[:, :2], -1)).clip(-1, 1e6).astype(int).T
@@ -118,7 +128,7 @@ def _sees(points, normals, outward, camera, depth, own):
     slope = uvz[:, 2] / camera.K[0, 0] / np.maximum(np.abs(cosine), 1e-3)
     limit = uvz[:, 2] - TOLERANCE_M - np.minimum(slope, MAX_SLANT_M)
     near = np.zeros(len(points), bool)
-    # A pixel's neighbours too: the sample may lie beside the centre of a pixel at the outline.
+    # The neighbours too: at the outline, a sample may lie beside the centre of its pixel.
     for du, dv in ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1)):
         at = (v + dv, u + du)
         near |= own[at] & (limit <= depth[at])

@@ -1,25 +1,33 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scenes in which most was missed, and why, from what the scores know anyway."""
+"""The worst-localized scenes and why their objects were missed."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
 
+from hooc_perception.core.arrays import Float64Array, Int64Array
 from hooc_perception.core.render import render_depth, render_patch
 from hooc_perception.core.segment.rectify import rectify
-from hooc_perception.core.types import RectifiedView
+from hooc_perception.core.types import GenericModel, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.as_json import plain
 from hooc_perception.evaluation.errors import world_mesh
-from hooc_perception.evaluation.evaluate import RECTIFY
-from hooc_perception.evaluation.matching import posed
-from hooc_perception.evaluation.tables import Table
+from hooc_perception.evaluation.evaluate import Evaluation, RECTIFY
+from hooc_perception.evaluation.matching import posed, PosedObject
+from hooc_perception.evaluation.scores import ObjectScore, SceneScore
+from hooc_perception.evaluation.tables import Cell, Table
 from hooc_perception.io.scenes.files import read_json
+from hooc_perception.io.scenes.scene_set import RecordedScene, SceneSet
 import numpy as np
 
-# What shows at this share of an object's pixels was put in its place.
+# An estimate that covers this share of an object's pixels was taken for it.
 IN_PLACE = 0.3
 FEW_PIXELS = 200
 HIDDEN = 0.5
+# {scene: {category: [whether the pool held a candidate near]}}, in the order of the truth.
+Pools: TypeAlias = Mapping[str, Mapping[str, list[bool]]]
 
 
 @dataclass(frozen=True)
@@ -28,14 +36,14 @@ class Missed:
     A true object that was not localized.
 
     :ivar truth: index among the true objects of its scene.
-    :ivar why: texts, what happened first, then what made it hard.
+    :ivar why: texts: what happened, then what made it hard.
     :ivar pixels: number of pixels that show it, over all views.
-    :ivar visible: that number over those that it would cover alone; None where it would none.
+    :ivar visible: their share of the pixels that it would cover alone; None where there are none.
     """
 
     category: str
     truth: int
-    why: tuple
+    why: tuple[str, ...]
     pixels: int
     visible: float | None
 
@@ -43,29 +51,27 @@ class Missed:
 @dataclass(frozen=True)
 class WorstScene:
     """
-    A scene with what was missed in it.
+    A scene with its missed objects.
 
     :ivar localized: share of its true objects.
-    :ivar missed: tuple of Missed.
-    :ivar wrong: indices of the estimates that stand for no localized object.
-    :ivar truths, estimates: tuples of PosedObject.
-    :ivar view: the RectifiedView that shows most of what was missed.
+    :ivar wrong: indices of the estimates that are matched to no localized object.
+    :ivar view: the one that shows most of the missed objects.
     """
 
     name: str
     localized: float
-    missed: tuple
-    wrong: tuple
-    truths: tuple = field(repr=False)
-    estimates: tuple = field(repr=False)
+    missed: tuple[Missed, ...]
+    wrong: tuple[int, ...]
+    truths: tuple[PosedObject, ...] = field(repr=False)
+    estimates: tuple[PosedObject, ...] = field(repr=False)
     view: RectifiedView = field(repr=False)
 
 
-def read_pools(path):
+def read_pools(path: str | Path) -> Pools:
     """
-    Return `pools_of` a scores file.
+    Return `pools_of` a stages file.
 
-    :raises HoocError: where it was written without --stages.
+    :raises HoocError: where the file is something else.
     """
     stages = read_json(path).get('stages')
     if not stages:
@@ -74,13 +80,13 @@ def read_pools(path):
     return pools_of(stages)
 
 
-def pools_of(stages):
+def pools_of(stages: Mapping[str, Any]) -> Pools:
     """
-    Return {scene: {category: [whether the pool held a candidate near]}} of the true objects.
+    Return whether the pools held a candidate near each true object.
 
-    :param stages: what `rerun` returns of the stages, or the same out of a scores file.
+    :param stages: the losses that `rerun` returns, or the same read from a stages file.
     """
-    out = {}
+    out: dict[str, dict[str, list[bool]]] = {}
     for scene, loss in plain(stages).items():
         out[scene] = {}
         for thing in loss['pool']['objects']:
@@ -88,15 +94,15 @@ def pools_of(stages):
     return out
 
 
-def worst_scenes(scene_set, evaluation, models, n, pools=None):
+def worst_scenes(scene_set: SceneSet, evaluation: Evaluation, models: Mapping[str, GenericModel],
+                 n: int, pools: Pools | None = None) -> list[WorstScene]:
     """
-    Return the n WorstScene with the least localized shares, the worst first.
+    Return the n scenes with the smallest localized shares, the worst first.
 
-    Among equals first the one with fewer objects within 2 cm, then with more false categories.
+    Ties are broken by fewer objects within 2 cm, then by more false categories.
 
-    :param evaluation: Evaluation; its scenes without poses are left out.
     :param models: {category: GenericModel}, see `scoring_models`.
-    :param pools: from `pools_of`; None = nobody knows what candidates there were.
+    :param pools: from `pools_of`; None = the candidates are not known.
     """
     scenes = {scene.name: scene for scene in scene_set.scenes}
     order = sorted((s for s in evaluation.scores if s.objects),
@@ -105,18 +111,20 @@ def worst_scenes(scene_set, evaluation, models, n, pools=None):
                        (pools or {}).get(s.name, {})) for s in order[:n]]
 
 
-def _looked_at(scene, score, estimates, models, pool):
+def _looked_at(scene: RecordedScene, score: SceneScore, estimates: tuple[PosedObject, ...],
+               models: Mapping[str, GenericModel],
+               pool: Mapping[str, list[bool]]) -> WorstScene:
     """Return the WorstScene of a RecordedScene and its SceneScore."""
-    truths = tuple(posed(t) for t in scene.truth)
+    truths = tuple(posed(t) for t in scene.truth or ())
     views = [rectify(view, RECTIFY) for view in scene.depth()]
     shown, alone, taken = _pixels(truths, estimates, models, views)
     placed = {o.estimate for o in score.objects if o.localized}
     wrong = tuple(i for i in range(len(estimates)) if i not in placed)
-    pool = {category: list(near) for category, near in pool.items()}
+    # The pools count the objects of a category in the order of the truth.
+    near_of = {category: iter(near) for category, near in pool.items()}
     missed = []
     for thing in sorted(score.objects, key=lambda o: o.truth):
-        # The pools count the objects of a category in the order of the truth.
-        near = pool[thing.category].pop(0) if pool.get(thing.category) else None
+        near = next(near_of.get(thing.category, iter(())), None)
         if not thing.localized:
             n, most = int(shown[thing.truth].sum()), int(alone[thing.truth].sum())
             visible = n / most if most else None
@@ -124,17 +132,19 @@ def _looked_at(scene, score, estimates, models, pool):
                    *_what_is_hard(n, visible))
             missed.append(Missed(thing.category, thing.truth, why, n, visible))
     rows = [m.truth for m in missed] or slice(None)
-    # The root, so that many objects that show a little count more than one that shows a lot.
+    # The root, so that many objects that are visible a little outweigh one that is visible a lot.
     view = views[int(np.sqrt(shown[rows]).sum(0).argmax())]
     return WorstScene(scene.name, score.localized, tuple(missed), wrong, truths, estimates, view)
 
 
-def _pixels(truths, estimates, models, views):
+def _pixels(truths: Sequence[PosedObject], estimates: Sequence[PosedObject],
+            models: Mapping[str, GenericModel], views: Sequence[RectifiedView],
+            ) -> tuple[Int64Array, Int64Array, Int64Array]:
     """
     Return (shown (n, V), alone (n, V), taken (n, m)), int arrays.
 
-    Pixels that show each of n true objects, that would if it stood alone, and those of the
-    first, over all views, at which each of m estimates shows.
+    Numbers of pixels that show each of n true objects in each view, that would show it if it
+    stood alone, and, over all views, of those of the first at which each of m estimates shows.
     """
     true, answer = ([world_mesh(o, models[o.category]) for o in objects]
                     for objects in (truths, estimates))
@@ -149,12 +159,13 @@ def _pixels(truths, estimates, models, views):
     return shown, alone, taken
 
 
-def _what_happened(thing, shares, estimates, wrong, near):
+def _what_happened(thing: ObjectScore, shares: Float64Array, estimates: Sequence[PosedObject],
+                   wrong: Sequence[int], near: bool | None) -> Iterator[str]:
     """
-    Yield what became of a missed object.
+    Yield what happened to a missed object.
 
     :param shares: (m,) shares of its pixels at which each estimate shows.
-    :param near: whether the pool held a candidate near, None where nobody knows.
+    :param near: whether the pool held a candidate near, None where that is not known.
     """
     if len(shares) and shares.max() >= IN_PLACE:
         most = int(shares.argmax())
@@ -167,20 +178,21 @@ def _what_happened(thing, shares, estimates, wrong, near):
         yield 'candidate there, not chosen' if near else 'no candidate'
 
 
-def _what_is_hard(pixels, visible):
-    """Yield what would make any method miss it."""
+def _what_is_hard(pixels: int, visible: float | None) -> Iterator[str]:
+    """Yield what makes an object hard for any method."""
     if pixels < FEW_PIXELS:
         yield f'few pixels ({pixels})'
     if visible is not None and visible < HIDDEN:
         yield f'visible share {visible:.2f}'
 
 
-def _words(category):
+def _words(category: str) -> str:
+    """Return the name of a category with spaces."""
     return category.replace('_', ' ')
 
 
-def worst_json(label, scenes):
-    """Return the content of worst.json: every scene with what was missed and what was wrong."""
+def worst_json(label: str, scenes: Sequence[WorstScene]) -> dict[str, Any]:
+    """Return the content of worst.json: missed objects and wrong estimates of every scene."""
     return plain({'format': 'hooc-worst/1', 'label': label, 'scenes': [
         {'scene': s.name, 'localized': s.localized, 'true': len(s.truths),
          'camera': s.view.camera.name, 'missed': [asdict(m) for m in s.missed],
@@ -189,9 +201,9 @@ def worst_json(label, scenes):
         for s in scenes]})
 
 
-def worst_table(content):
-    """Return the Table of what `worst_json` holds: a row a missed object."""
-    rows = []
+def worst_table(content: Mapping[str, Any]) -> Table:
+    """Return the Table of what `worst_json` holds: one row per missed object."""
+    rows: list[tuple[Cell, ...]] = []
     for scene in content['scenes']:
         wrong = ', '.join(_words(w['category']) for w in scene['wrong']) or None
         for k, m in enumerate(scene['missed'] or [None]):
@@ -202,8 +214,9 @@ def worst_table(content):
     return Table(
         f'The worst scenes of `{content["label"]}`',
         ('scene', 'localized', 'missed', 'why', 'pixels', 'visible', 'wrong'), tuple(rows),
-        (f'taken for, covered by: what the answer shows at {100 * IN_PLACE:.0f} % or more of the '
-         "object's pixels, where that is itself wrong, or localized; candidate there: the pool "
-         "held one within half the model's size; pixels: that show the object, over all views "
-         f'(few: below {FEW_PIXELS}); visible: that number over those it would cover alone (told '
-         f'as a reason below {HIDDEN}); wrong: estimates that stand for no localized object.',))
+        (f'taken for, covered by: an estimate that shows at {100 * IN_PLACE:.0f} % or more of the '
+         "object's pixels and is itself wrong (taken for) or localized (covered by); candidate "
+         "there: the pool held one within half the model's size; pixels: number of pixels that "
+         f'show the object, over all views (few: below {FEW_PIXELS}); visible: their share of the '
+         f'pixels that it would cover alone (listed as a reason below {HIDDEN}); wrong: estimates '
+         'that are matched to no localized object.',))

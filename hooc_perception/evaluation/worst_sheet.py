@@ -1,17 +1,22 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""One picture of the worst scenes: what was missed, what was wrong, what was right."""
+"""One picture of the worst scenes: missed objects, wrong estimates, localized objects."""
 
+from collections.abc import Iterable, Mapping, Sequence
 import io
 import json
 from pathlib import Path
+from typing import TypeAlias
 
+from hooc_perception.core.arrays import BoolArray, Float64Array, Int32Array
 from hooc_perception.core.render import render_depth, render_patch
+from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.report.pictures import depth_picture
 from hooc_perception.evaluation.tables import to_markdown
-from hooc_perception.evaluation.worst import worst_json, worst_table
+from hooc_perception.evaluation.worst import worst_json, worst_table, WorstScene
 import matplotlib
+from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -22,13 +27,16 @@ from PIL import Image
 MISSED, WRONG, RIGHT = '#ff5040', '#ff5cf4', '#58d68d'
 COLUMNS = 3
 MARGIN_PX = 14
+# Left, top, right and bottom border, the latter two exclusive, pixels.
+Window: TypeAlias = tuple[int, int, int, int]
 
 
-def write_worst(folder, label, scenes, models):
+def write_worst(folder: str | Path, label: str, scenes: Sequence[WorstScene],
+                models: Mapping[str, GenericModel]) -> list[Path]:
     """
     Write worst.png, worst.json and worst.md into a folder; return their paths.
 
-    :param scenes: sequence of WorstScene, at least one.
+    :param scenes: at least one.
     :param models: {category: GenericModel}.
     """
     folder = Path(folder)
@@ -41,8 +49,9 @@ def write_worst(folder, label, scenes, models):
     return paths
 
 
-def draw_sheet(scenes, models, path):
-    """Draw a panel a scene into a PNG file, and what the colours mean."""
+def draw_sheet(scenes: Sequence[WorstScene], models: Mapping[str, GenericModel],
+               path: Path) -> None:
+    """Draw one panel per scene and a legend into a PNG file."""
     rows = -(-(len(scenes) + 1) // COLUMNS)
     with matplotlib.rc_context({'font.size': 9}):
         figure = Figure(figsize=(4.2 * COLUMNS, 3.4 * rows), layout='constrained')
@@ -53,7 +62,7 @@ def draw_sheet(scenes, models, path):
             _panel(ax, scene, models)
         axes[len(scenes)].legend(
             handles=[Line2D([], [], color=MISSED, label='missed: the true object'),
-                     Line2D([], [], color=MISSED, ls=':', label='missed, and hidden in this view'),
+                     Line2D([], [], color=MISSED, ls=':', label='missed, hidden in this view'),
                      Line2D([], [], color=WRONG, label='wrong: an estimate'),
                      Line2D([], [], color=RIGHT, lw=0.8, label='localized: the true object')],
             loc='center left', frameon=False)
@@ -63,8 +72,8 @@ def draw_sheet(scenes, models, path):
         palette=_palette(), dither=Image.Dither.NONE).save(path, 'PNG', optimize=True)
 
 
-def _palette():
-    """Return an image with the sheet's palette: greys, and the outlines' colours over greys."""
+def _palette() -> Image.Image:
+    """Return an image with the palette of the sheet: greys, and the outline colours on greys."""
     greys = np.repeat(np.linspace(0, 255, 112)[:, None], 3, 1)
     over = [greys[::10] * (1 - a) + 255 * np.array(to_rgb(colour)) * a
             for colour in (MISSED, WRONG, RIGHT) for a in (1, 0.75, 0.5, 0.25)]
@@ -73,8 +82,8 @@ def _palette():
     return image
 
 
-def _panel(ax, scene, models):
-    """Draw one scene as the camera sees it that shows most of what was missed."""
+def _panel(ax: Axes, scene: WorstScene, models: Mapping[str, GenericModel]) -> None:
+    """Draw one scene in the view that shows most of the missed objects."""
     camera, depth = scene.view.camera, scene.view.depth
     true = [world_mesh(t, models[t.category]) for t in scene.truths]
     shown = render_depth(true, camera)[1]
@@ -105,42 +114,44 @@ def _panel(ax, scene, models):
                  f'{len(scene.wrong)} wrong ({camera.name})', fontsize=9)
 
 
-def _alone(mesh, camera):
-    """Return (H, W) bool: where a mesh would be seen if nothing stood before it."""
+def _alone(mesh: tuple[Float64Array, Int32Array], camera: Camera) -> BoolArray:
+    """Return (H, W) bool: where a mesh would be visible if nothing occluded it."""
     mask = np.zeros(camera.height * camera.width, bool)
-    mask[render_patch(*mesh, camera)[0]] = True
+    mask[render_patch(mesh[0], mesh[1], camera)[0]] = True
     return mask.reshape(camera.height, camera.width)
 
 
-def _window(mask):
+def _window(mask: BoolArray) -> Window | None:
     """Return (u0, v0, u1, v1) around a mask, None where it is empty."""
     v, u = np.nonzero(mask)
     return (u.min(), v.min(), u.max() + 1, v.max() + 1) if len(u) else None
 
 
-def _limits(windows, camera):
+def _limits(windows: Iterable[Window | None], camera: Camera) -> Window:
     """Return (u0, v0, u1, v1) around all windows with a margin, within the image."""
     known = np.array([w for w in windows if w] or [(0, 0, camera.width, camera.height)])
     low = np.maximum(known[:, :2].min(0) - MARGIN_PX, 0)
     high = np.minimum(known[:, 2:].max(0) + MARGIN_PX, (camera.width, camera.height))
-    return (*map(int, low), *map(int, high))
+    return int(low[0]), int(low[1]), int(high[0]), int(high[1])
 
 
-def _outline(ax, mask, colour, width, style='-'):
-    """Draw the outline of a mask; return whether there was any."""
+def _outline(ax: Axes, mask: BoolArray, colour: str, width: float, style: str = '-') -> None:
+    """Draw the outline of a mask, if it is not empty."""
     if mask.any():
         # Padded, so that the outline closes at the border of the image.
         ax.contour(np.arange(-1, mask.shape[1] + 1), np.arange(-1, mask.shape[0] + 1),
                    np.pad(mask, 1).astype(float), [0.5], colors=[colour], linewidths=[width],
                    linestyles=[style])
-    return mask.any()
 
 
-def _labelled(ax, mask, colour, category, side, style='-'):
-    """Draw an outline with its name above or below, so that two things at a place both show."""
-    if not _outline(ax, mask, colour, 1.5, style):
+def _labelled(ax: Axes, mask: BoolArray, colour: str, category: str, side: str,
+              style: str = '-') -> None:
+    """Draw an outline with its name above or below, so that two at one place are both legible."""
+    window = _window(mask)
+    if window is None:
         return
-    u0, v0, u1, v1 = _window(mask)
+    _outline(ax, mask, colour, 1.5, style)
+    u0, v0, u1, v1 = window
     at = (v0 - 1, 'bottom') if side == 'above' else (v1, 'top')
     ax.text((u0 + u1 - 1) / 2, at[0], category.replace('_', ' '), color=colour, fontsize=8,
             fontweight='bold', ha='center', va=at[1], in_layout=False,

@@ -36,8 +36,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--dry-run', action='store_true', help='only print what would run and why')
     args = parser.parse_args(argv)
     try:
-        sets = dict(s.partition('=')[::2] for s in args.set or ['twin'])
-        sets = {name: folder or None for name, folder in sets.items()}
+        sets = {name: folder or None
+                for name, _, folder in (s.partition('=') for s in args.set or ['twin'])}
         steps = plan.steps_of(sets, args.out, args.rows, args.seed, args.jobs)
         records = run(steps, args.out, args.keep, args.force, args.dry_run)
         if not args.dry_run:

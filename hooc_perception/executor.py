@@ -1,17 +1,19 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Where work that joblib spreads runs: on the cores at hand, or on a Dask cluster.
+Where joblib runs parallel work: on the local cores or on a Dask cluster.
 
-Whatever is computed through `joblib.Parallel` inside of `executor(...)` goes there; the results
-are the same either way, because every piece of work draws from its own random stream.
+Everything that uses `joblib.Parallel` inside of `executor(...)` runs there. The results are the
+same either way, because every piece of work has its own random stream.
 """
 
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 import hashlib
 from importlib import import_module
 from pathlib import Path
 import platform
+from typing import Any
 
 from hooc_perception.errors import HoocError
 import joblib
@@ -19,22 +21,22 @@ import joblib
 LOCAL = 'local'
 CONNECT_S = 10.0
 PACKAGE = Path(__file__).resolve().parent
-# Another version of one of these may round in another way.
+# Another version of one of these may round differently.
 DECISIVE = ('numpy', 'scipy', 'numba', 'mujoco', 'open3d', 'trimesh', 'manifold3d',
             'python-fcl')
 
 
 @contextmanager
-def executor(where=LOCAL):
+def executor(where: str = LOCAL) -> Iterator[None]:
     """
-    Let joblib run in the block where `where` says.
+    Make joblib run its work at `where` within the block.
 
     Work that shares large arrays between threads (trees of a forest) stays in this process.
 
     :param where: 'local', or 'dask=ADDRESS' with the address of a Dask scheduler, whose workers
         have this package and the same versions of the libraries.
-    :raises HoocError: another text, Dask missing, nobody at the address, no workers, or
-        workers with other code.
+    :raises HoocError: where the text is something else, Dask is missing, no scheduler answers,
+        or its workers are missing or run other code.
     """
     name, equals, address = where.partition('=')
     if where == LOCAL:
@@ -47,18 +49,18 @@ def executor(where=LOCAL):
                         'of a Dask scheduler, such as dask=tcp://10.0.0.1:8786')
 
 
-def spread(function, *arguments):
+def spread(function: Callable[..., Any], *arguments: Iterable[Any]) -> Iterator[Any]:
     """
-    Yield what `map` would: one call after the other here, side by side on a cluster.
+    Yield what `map` would: one call after the other locally, in parallel on a cluster.
 
-    :param function: importable under its name by the workers; `arguments`: iterables.
+    :param function: a module-level function, which the workers can import.
     """
     yield from joblib.Parallel(n_jobs=1, return_as='generator')(
         joblib.delayed(function)(*row) for row in zip(*arguments))
 
 
 @contextmanager
-def _client(address):
+def _client(address: str) -> Iterator[Any]:
     """Yield a connected distributed.Client whose workers run the same code as we do."""
     try:
         distributed = import_module('distributed')
@@ -78,8 +80,8 @@ def _client(address):
             client.close(timeout=CONNECT_S)
 
 
-def _check_workers(client, address):
-    """Raise HoocError unless there are workers and all of them run the code that we run."""
+def _check_workers(client: Any, address: str) -> None:
+    """Raise HoocError unless there are workers and all of them run the same code as we do."""
     if not client.nthreads():
         raise HoocError(f'the Dask scheduler at {address!r} has no workers; start some with '
                         f'`dask worker {address} --nworkers -1 --nthreads 1`')
@@ -90,11 +92,11 @@ def _check_workers(client, address):
     check(answers, versions())
 
 
-def check(answers, ours):
+def check(answers: Mapping[str, Any], ours: Mapping[str, str]) -> None:
     """
     Raise HoocError where a worker differs from us.
 
-    :param answers: {worker: its `versions()`, or the exception that it met instead}.
+    :param answers: {worker: its `versions()`, or the exception that was raised instead}.
     :param ours: our `versions()`.
     """
     for worker, theirs in sorted(answers.items()):
@@ -104,11 +106,12 @@ def check(answers, ours):
         for name in ours:
             if theirs.get(name) != ours[name]:
                 raise HoocError(f'{worker} of the cluster has {name} {theirs.get(name)}, here it '
-                                f'is {ours[name]}; results could differ; install the same there')
+                                f'is {ours[name]}, so results could differ; install the same '
+                                'version there')
 
 
-def versions():
-    """Return {name: version} of all that decides about results; of our own code, a digest."""
+def versions() -> dict[str, str]:
+    """Return {name: version} of everything that affects results; of our own code, a digest."""
     from importlib.metadata import PackageNotFoundError, version
     digest = hashlib.sha256()
     for path in sorted(PACKAGE.rglob('*.py')):
@@ -122,6 +125,6 @@ def versions():
     return found
 
 
-def _short(error):
+def _short(error: BaseException) -> str:
     """Return the message of an error on one line."""
     return ' '.join(str(error).split())[:200] or type(error).__name__

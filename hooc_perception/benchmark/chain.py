@@ -5,8 +5,10 @@
 from dataclasses import dataclass
 import resource
 
+from hooc_perception.benchmark.scene import BenchScene
 from hooc_perception.core.types import DepthView
 from hooc_perception.parser import Parser
+from hooc_perception.trained.folder import ModelFolder
 import numpy as np
 
 RUNS = 3
@@ -15,23 +17,23 @@ RUNS = 3
 @dataclass(frozen=True)
 class ChainTimes:
     """
-    What one profile took.
+    The time and memory of one profile.
 
     :ivar seconds: {stage: median s over the runs}.
-    :ivar objects, candidates: how many there were, as a sign that work was done.
-    :ivar peak_mb: most memory that this process has had so far, everything included.
+    :ivar objects, candidates: their numbers, as a sign that work was done.
+    :ivar peak_mb: peak memory of this process so far, everything included.
     """
 
     profile: str
-    seconds: dict
+    seconds: dict[str, float]
     objects: int
     candidates: int
     peak_mb: float
 
 
-def chain_times(folder, scene):
+def chain_times(folder: ModelFolder, scene: BenchScene) -> ChainTimes:
     """
-    Return the ChainTimes of a ModelFolder's own profile on a BenchScene.
+    Return the ChainTimes of the profile that a model was trained for.
 
     The first run compiles and warms up; it is not counted.
     """

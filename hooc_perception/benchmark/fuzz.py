@@ -3,51 +3,57 @@
 """
 Feed damaged bags, messages and models to everything that reads them.
 
-Each case is drawn from its number alone and runs in a process that may neither crash, nor
-hang, nor fill the memory: it is read, or refused in one sentence.
+Each case is generated from its number alone and runs in a process of its own that must not
+crash, hang or exhaust the memory: the input is either read or rejected in one sentence.
 """
 
 from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 import importlib
 import multiprocessing
+from multiprocessing.connection import Connection
 import os
 from pathlib import Path
 import resource
 import tempfile
 import time
+from typing import TypeAlias
 
 from hooc_perception.benchmark.fuzz_bags import bag_cases
 from hooc_perception.benchmark.fuzz_models import model_cases
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.errors import HoocError
+import numpy as np
 
 READ, REJECTED = 'read', 'rejected'
-# A case takes milliseconds, but the first that parses compiles the kernels, on a slow machine for
-# more than a minute. Longer than this is a hang.
+# A case takes milliseconds, but the first one that parses compiles the kernels, which takes more
+# than a minute on a slow machine. Longer than this is a hang.
 HANG_S = 240.0
 MEMORY_BYTES = 6 << 30
 LONGEST_SENTENCE = 700
+Case: TypeAlias = Callable[[np.random.Generator, Path], None]
 
 
 @dataclass
 class FuzzResult:
     """
-    What came of all cases.
+    The outcomes of all cases.
 
-    :ivar outcomes: (kind of case, 'read' or 'refused') -> number.
+    :ivar outcomes: (kind of case, 'read' or 'rejected') -> number.
     :ivar failures: [(case number, kind, what happened)]: crashes, hangs, exceptions other than
-        HoocError, refusals that are not one sentence.
+        HoocError, rejections that are not one sentence.
     """
 
-    outcomes: Counter = field(default_factory=Counter)
-    failures: list = field(default_factory=list)
+    outcomes: Counter[tuple[str, str]] = field(default_factory=Counter)
+    failures: list[tuple[int, str, str]] = field(default_factory=list)
 
 
 OURS = 'hooc_perception.benchmark.fuzz:kinds_of_cases'
 
 
-def fuzz(cases, seed=0, progress=iter, source=OURS):
+def fuzz(cases: int, seed: int = 0, progress: Callable[[range], Iterable[int]] = iter,
+         source: str = OURS) -> FuzzResult:
     """
     Run cases 0..cases-1 of a seed; return the FuzzResult.
 
@@ -72,7 +78,8 @@ def fuzz(cases, seed=0, progress=iter, source=OURS):
     return result
 
 
-def run_case(number, seed, kinds, folder):
+def run_case(number: int, seed: int, kinds: Mapping[str, Case],
+             folder: str | Path) -> tuple[str, str, str]:
     """Return (kind, outcome, text) of one case; `kinds` maps names to functions."""
     rng = stage_rng(seed, 'fuzz', number)
     kind = sorted(kinds)[number % len(kinds)]
@@ -82,10 +89,10 @@ def run_case(number, seed, kinds, folder):
     except HoocError as error:
         text = str(error)
         if not text.strip() or '\n' in text or len(text) > LONGEST_SENTENCE:
-            return kind, 'bad sentence', f'no one sentence: {text[:300]!r}'
+            return kind, 'bad sentence', f'not one sentence: {text[:300]!r}'
         return kind, REJECTED, text
     except MemoryError:
-        return kind, 'memory', f'more than {MEMORY_BYTES} bytes were asked for'
+        return kind, 'memory', f'more than {MEMORY_BYTES} bytes were requested'
     except Exception as error:
         import traceback
         where = traceback.extract_tb(error.__traceback__)[-1]
@@ -93,7 +100,7 @@ def run_case(number, seed, kinds, folder):
                                    f'{where.lineno}')
 
 
-def kinds_of_cases():
+def kinds_of_cases() -> dict[str, Case]:
     """Return {name: function(rng, folder)} of all kinds of cases that can run here."""
     kinds = {**bag_cases(), **model_cases()}
     try:
@@ -107,7 +114,7 @@ def kinds_of_cases():
 class _Worker:
     """A process that runs cases one by one."""
 
-    def __init__(self, seed, source):
+    def __init__(self, seed: int, source: str) -> None:
         context = multiprocessing.get_context('spawn')
         self._folder = tempfile.TemporaryDirectory(prefix='hooc_fuzz_')
         self._here, there = context.Pipe()
@@ -117,8 +124,8 @@ class _Worker:
         there.close()
         self._here.recv()       # it is ready
 
-    def run(self, number):
-        """Return (kind, outcome, text) of a case; a dead worker is an outcome, too."""
+    def run(self, number: int) -> tuple[str, str, str]:
+        """Return (kind, outcome, text) of a case; a dead worker is an outcome as well."""
         self._here.send(number)
         deadline = time.monotonic() + HANG_S
         while time.monotonic() < deadline:
@@ -130,21 +137,23 @@ class _Worker:
                 return '?', 'crash', f'the process died (exit code {self._process.exitcode})'
         self._process.kill()
         self._process.join(5)
-        return '?', 'hang', f'no end after {HANG_S:g} s'
+        return '?', 'hang', f'not finished after {HANG_S:g} s'
 
-    def alive(self):
+    def alive(self) -> bool:
+        """Return whether the process can run another case."""
         return self._process.is_alive()
 
-    def close(self):
+    def close(self) -> None:
+        """End the process and remove its files."""
         self._process.kill()
         self._process.join(5)
         self._folder.cleanup()
 
 
-def _serve(connection, seed, source, folder):
+def _serve(connection: Connection, seed: int, source: str, folder: str) -> None:
     """Run the cases whose numbers come through the pipe."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
-    with open(os.devnull, 'w') as nothing:      # C libraries complain on their own
+    with open(os.devnull, 'w') as nothing:      # C libraries print errors of their own
         os.dup2(nothing.fileno(), 2)
     module, _, name = source.partition(':')
     kinds = getattr(importlib.import_module(module), name)()

@@ -2,7 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Kinds of cases for the fuzzer: damaged bags, read as every command reads them."""
 
+from collections.abc import Callable
 import functools
+from pathlib import Path
 import shutil
 from types import SimpleNamespace
 from typing import Any
@@ -36,13 +38,14 @@ def small_scene() -> tuple[Any, Any]:
 
 
 @functools.lru_cache
-def _originals(folder):
+def _originals(folder: Path) -> dict[str, Path]:
     """Write the undamaged bags once; return {storage: path}."""
     return {storage: write_bag(*small_scene(), folder / f'good_{storage}', storage, repeat=3)
             for storage in ('mcap', 'sqlite3')}
 
 
-def _bag(rng, folder, storage, what='file', sealed=True):
+def _bag(rng: np.random.Generator, folder: Path, storage: str, what: str = 'file',
+         sealed: bool = True) -> Path:
     """Return a damaged copy of a bag."""
     source = _originals(folder)[storage]
     bag = folder / 'case' / source.name
@@ -60,22 +63,22 @@ def _bag(rng, folder, storage, what='file', sealed=True):
     return bag
 
 
-def _without_checksums(data):
+def _without_checksums(data: bytes) -> bytes:
     """Return an MCAP file as most recorders leave it, so that damage reaches the messages."""
-    data = bytearray(data)
+    out = bytearray(data)
     for opcode, at, _ in list(records(data)):
         if opcode == 6:
-            data[at + 24:at + 28] = bytes(4)
+            out[at + 24:at + 28] = bytes(4)
         elif opcode == 15:
-            data[at:at + 4] = bytes(4)
+            out[at:at + 4] = bytes(4)
         elif opcode == 2:
-            data[at + 16:at + 20] = bytes(4)
-    return bytes(data)
+            out[at + 16:at + 20] = bytes(4)
+    return bytes(out)
 
 
-def _read(bag):
+def _read(bag: Path) -> None:
     """Do with a bag what `hooc run` and `hooc doctor` do, then salvage it."""
-    first = None
+    first: HoocError | None = None
     for action in (lambda: BagScene(bag).views(), lambda: list(iter_messages(bag)),
                    lambda: salvage_bag(bag)):
         try:
@@ -89,7 +92,7 @@ def _read(bag):
         raise first
 
 
-def bag_cases():
+def bag_cases() -> dict[str, Callable[[np.random.Generator, Path], None]]:
     """Return {kind: function(rng, folder)}."""
     return {
         'mcap bag': lambda rng, folder: _read(_bag(rng, folder, 'mcap')),

@@ -2,6 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Kinds of cases for the fuzzer: messages as broken drivers and other versions send them."""
 
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from geometry_msgs.msg import TransformStamped
 from hooc_perception.benchmark.fuzz_bags import small_scene
 from hooc_perception.benchmark.mutate import damaged, odd_number, odd_text
 from hooc_perception.core.geometry import pose_from_matrix
@@ -21,12 +26,12 @@ from hooc_perception.ros.messages.stages import (
 )
 import numpy as np
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CameraInfo, Image
 
 _SCENE, _ = small_scene()
 
 
-def _raw_messages():
+def _raw_messages() -> tuple[Image, CameraInfo, TransformStamped]:
     """Return (Image, CameraInfo, TransformStamped) of the small scene's first camera."""
     view = _SCENE.depth()[0]
     head = c.header(10 ** 18, 'left_optical')
@@ -36,7 +41,7 @@ def _raw_messages():
                                 c.header(0, 'table'), 'left_optical'))
 
 
-def _spoil(message, rng, chance=0.2):
+def _spoil(message: Any, rng: np.random.Generator, chance: float = 0.2) -> None:
     """Change fields of a message in place, nested ones too."""
     for name, kind in message.get_fields_and_field_types().items():
         value = getattr(message, name)
@@ -48,10 +53,10 @@ def _spoil(message, rng, chance=0.2):
         try:
             setattr(message, name, _odd(value, kind, rng))
         except (AssertionError, ValueError, TypeError, OverflowError):
-            pass    # no message can hold that
+            pass    # a message cannot hold that value
 
 
-def _odd(value, kind, rng):
+def _odd(value: Any, kind: str, rng: np.random.Generator) -> Any:
     """Return a strange value of the same type."""
     if isinstance(value, str):
         return odd_text(rng)
@@ -65,8 +70,8 @@ def _odd(value, kind, rng):
     return values
 
 
-def _camera_case(rng, _):
-    """Give one camera's messages, spoilt, to all that ingestion does with them."""
+def _camera_case(rng: np.random.Generator, _: Path) -> None:
+    """Pass the corrupted messages of one camera to everything that ingestion does with them."""
     messages = _raw_messages()
     for message in messages:
         if rng.random() < 0.6:
@@ -74,19 +79,20 @@ def _camera_case(rng, _):
     _decode(*messages)
 
 
-def _decode(image, info, transform):
+def _decode(image: Image, info: CameraInfo, transform: TransformStamped) -> None:
+    """Do with the messages of a camera what the ingestion node does."""
     frames = RawFrames('left')
     frame = frames.decode(image, info, transform, 4.0)
     frames.remember(frame.depth, 3)
     if frame.depth.size > 2 ** 22:
-        raise HoocError('larger than the fuzzer has time for')
+        raise HoocError('the image is larger than the fuzzer has time for')
     view = rectify(frames.view(frame)[0])
     table_trouble(view, 0.025, 0.8)
     observe([view], ObserveConfig())
 
 
-def _wire_case(rng, _):
-    """Give bytes that are no Image to the deserializer, as a replayed bag may."""
+def _wire_case(rng: np.random.Generator, _: Path) -> None:
+    """Pass bytes that are not an Image to the deserializer, as a replayed bag may."""
     image, info, transform = _raw_messages()
     data = damaged(serialize_message(image), rng)
     try:
@@ -96,8 +102,8 @@ def _wire_case(rng, _):
     _decode(image, info, transform)
 
 
-def _stage_case(rng, _):
-    """Give spoilt messages of one stage to the next."""
+def _stage_case(rng: np.random.Generator, _: Path) -> None:
+    """Pass the corrupted messages of one stage to the next."""
     n = int(rng.integers(0, 6))
     head = c.header(5, 'table')
     candidates = Candidates(
@@ -118,7 +124,7 @@ def _stage_case(rng, _):
     candidates_from_messages(poses, attributes, 1)
 
 
-def message_cases():
+def message_cases() -> dict[str, Callable[[np.random.Generator, Path], None]]:
     """Return {kind: function(rng, folder)}."""
     return {'messages of a camera': _camera_case, 'bytes on the wire': _wire_case,
             'messages of a stage': _stage_case}

@@ -2,31 +2,39 @@
 # SPDX-License-Identifier: Apache-2.0
 """How processor time and memory of a scene grow with views, categories, objects and pixels."""
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
 import ctypes
 from dataclasses import dataclass, replace
 import gc
 from pathlib import Path
 import time
+from typing import Any, TypeAlias
 
+from hooc_perception.core.arrays import AnyArray
 from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.profiles import Profile
 from hooc_perception.core.profiles import profile as named_profile
-from hooc_perception.core.types import DepthView
+from hooc_perception.core.types import DepthView, GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.parser import Parser
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.synthesis.scatter import ScatterConfig
 from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
+from hooc_perception.trained.folder import ModelFolder
 import numpy as np
 
 # Everything else stays at BASE while one of them changes; `pixels` is a factor on a Kinect v2's.
-BASE = {'views': 3, 'categories': 25, 'objects': 20, 'pixels': 1.0}
-AXES = {'views': (1, 2, 3, 4, 5, 6), 'categories': (10, 25, 50, 100), 'objects': (5, 10, 20, 40),
-        'pixels': (0.25, 0.5, 1.0, 2.0, 4.0)}
+BASE: dict[str, float] = {'views': 3, 'categories': 25, 'objects': 20, 'pixels': 1.0}
+AXES: dict[str, Sequence[float]] = {
+    'views': (1, 2, 3, 4, 5, 6), 'categories': (10, 25, 50, 100), 'objects': (5, 10, 20, 40),
+    'pixels': (0.25, 0.5, 1.0, 2.0, 4.0)}
 WIDTH, HEIGHT, FOCAL = 512, 424, 366.0
 # Objects come from the first categories only, so that the scene stays when categories are added.
 PRESENT = 10
 SIZE_SPREAD = 0.15
+# {axis: value}, as BASE.
+Setting: TypeAlias = dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -34,14 +42,13 @@ class Point:
     """
     One scene, measured once.
 
-    :ivar setting: {axis: value}, as BASE.
-    :ivar cpu_s: processor seconds of all threads, kernels compiled before.
-    :ivar peak_mb: most resident memory of the process meanwhile, libraries and model included;
-        NaN where the system does not say.
-    :ivar standing, candidates, found: how many objects stood there, were considered, came out.
+    :ivar cpu_s: processor seconds of all threads, after compilation.
+    :ivar peak_mb: peak resident memory of the process meanwhile, libraries and model included;
+        NaN where the system does not report it.
+    :ivar standing, candidates, found: numbers of objects in the scene, candidates and results.
     """
 
-    setting: dict
+    setting: Setting
     cpu_s: float
     peak_mb: float
     standing: int
@@ -49,17 +56,19 @@ class Point:
     found: int
 
 
-def with_categories(models, classifier, count, rng):
+def with_categories(models: Sequence[GenericModel], classifier: Mapping[str, AnyArray],
+                    count: int, rng: np.random.Generator,
+                    ) -> tuple[tuple[GenericModel, ...], dict[str, Any]]:
     """
     Return (models, classifier) with `count` categories: fewer, or resized copies of them.
 
-    Copies share the probability of their original evenly; what is left out goes to the others.
+    Copies share the probability of their original evenly; that of omitted ones goes to the rest.
 
-    :param models: tuple of GenericModel; `classifier` the arrays of the fused forest.
+    :param classifier: the arrays of the fused forest.
     """
     source = np.arange(count) % len(models)
     more = []
-    for k, origin in enumerate(source):
+    for k, origin in enumerate(source.tolist()):
         model = models[origin]
         more.append(model if k < len(models) else _resized(
             model, f'{model.name}_{k // len(models) + 1}',
@@ -74,8 +83,8 @@ def with_categories(models, classifier, count, rng):
     return tuple(more), arrays
 
 
-def _resized(model, name, factor):
-    """Return a GenericModel of another size; resting poses and symmetry stay true."""
+def _resized(model: GenericModel, name: str, factor: float) -> GenericModel:
+    """Return a GenericModel of another size; resting poses and symmetry stay valid."""
     return replace(model, name=name, vertices=model.vertices * factor,
                    extents=model.extents * factor,
                    surface_points=model.surface_points * np.float32(factor),
@@ -83,8 +92,9 @@ def _resized(model, name, factor):
                    volume=model.volume * factor ** 3)
 
 
-def scene_views(models, views, objects, pixels, seed):
-    """Return (DepthViews, number of objects that stand there) of a synthetic scene."""
+def scene_views(models: Sequence[GenericModel], views: int, objects: int, pixels: float,
+                seed: int) -> tuple[list[DepthView], int]:
+    """Return (DepthViews, number of objects) of a synthetic scene."""
     side = float(np.sqrt(pixels))
     cameras = ring(stage_rng(seed, 'growth/rig', views), views, round(WIDTH * side),
                    round(HEIGHT * side), FOCAL * side)
@@ -96,7 +106,9 @@ def scene_views(models, views, objects, pixels, seed):
     return [DepthView(v.camera, v.depth) for v in scene.views], len(scene.objects)
 
 
-def grow(folder, profile=None, seed=0, axes=None, each=iter):
+def grow(folder: ModelFolder, profile: str | None = None, seed: int = 0,
+         axes: Mapping[str, Sequence[float]] | None = None,
+         each: Callable[[list[Any]], Iterable[Any]] = iter) -> dict[str, list[Point]]:
     """
     Return {axis: [Point]}; the common point is measured once.
 
@@ -108,7 +120,7 @@ def grow(folder, profile=None, seed=0, axes=None, each=iter):
     """
     if 'forest_leaf_p' not in folder.classifier:
         raise HoocError(f'{folder.path} was trained for one rig (profile {folder.profile}); '
-                        '--growth needs a model of the profile best or fast')
+                        'hooc bench growth needs a model of the profile best or fast')
     axes = axes or AXES
     chosen = named_profile(profile or folder.profile)
     settings = {axis: [{**BASE, axis: value} for value in values]
@@ -120,17 +132,18 @@ def grow(folder, profile=None, seed=0, axes=None, each=iter):
     return {axis: [points[_key(s)] for s in rows] for axis, rows in settings.items()}
 
 
-def _key(setting):
+def _key(setting: Setting) -> tuple[tuple[str, float], ...]:
     """Return a hashable, sortable form of a setting."""
     return tuple(sorted(setting.items()))
 
 
-def _measure(folder, chosen, setting, seed):
+def _measure(folder: ModelFolder, chosen: Profile, setting: Setting, seed: int) -> Point:
     """Return the Point of a setting."""
-    views, standing = scene_views(folder.models, setting['views'], setting['objects'],
+    views, standing = scene_views(folder.models, int(setting['views']), int(setting['objects']),
                                   setting['pixels'], seed)
     models, classifier = with_categories(folder.models, folder.classifier,
-                                         setting['categories'], stage_rng(seed, 'growth/sizes'))
+                                         int(setting['categories']),
+                                         stage_rng(seed, 'growth/sizes'))
     parser = Parser(models, classifier, chosen)
     _reset_peak()
     start = time.process_time()
@@ -139,8 +152,8 @@ def _measure(folder, chosen, setting, seed):
     return Point(setting, seconds, _peak_mb(), standing, len(parsed.pool), len(parsed.objects))
 
 
-def _reset_peak():
-    """Give freed memory back and let the kernel count the peak anew (Linux)."""
+def _reset_peak() -> None:
+    """Return freed memory to the system and reset its peak counter (Linux)."""
     gc.collect()
     try:
         ctypes.CDLL(None).malloc_trim(0)
@@ -149,7 +162,7 @@ def _reset_peak():
         pass
 
 
-def _peak_mb():
+def _peak_mb() -> float:
     """Return the process's peak resident memory since `_reset_peak`."""
     try:
         for line in Path('/proc/self/status').read_text().splitlines():
@@ -160,13 +173,13 @@ def _peak_mb():
     return float('nan')
 
 
-def exponent(points, axis, what):
+def exponent(points: Sequence[Point], axis: str, what: str) -> float:
     """Return k of the least-squares fit value ~ n^k, `what` an attribute of Point."""
     n = np.log([p.setting[axis] for p in points])
     return float(np.polyfit(n, np.log([getattr(p, what) for p in points]), 1)[0])
 
 
-def write_plot(path, grown, title):
+def write_plot(path: str | Path, grown: Mapping[str, Sequence[Point]], title: str) -> None:
     """Draw time and memory over every axis as one PNG."""
     from matplotlib.figure import Figure
     figure = Figure(figsize=(3.0 * len(grown), 5.2), layout='constrained')
@@ -184,7 +197,7 @@ def write_plot(path, grown, title):
                 ax.set_ylabel(label)
         axes[1, column].set_xlabel('pixels, times 512 x 424' if axis == 'pixels' else axis)
     for ax in axes[:, 0]:
-        # Only when all is drawn: a limit that is set stays, whatever a row's other axes hold.
+        # Last, because a limit that is set stays, whatever is drawn later into its row.
         ax.set_ylim(0, None)
     figure.suptitle(title, fontsize=10)
     Path(path).parent.mkdir(parents=True, exist_ok=True)

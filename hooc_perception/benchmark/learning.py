@@ -2,7 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contests of classification and alignment: forests and ICP."""
 
+from typing import Any
+
 from hooc_perception.benchmark.measure import Contest, Contestant
+from hooc_perception.benchmark.scene import BenchScene
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.geometry import matrix_from_pose, stage_rng, transform
 from hooc_perception.core.methods.icp import align, model_cloud
@@ -15,7 +19,7 @@ PIXELS, FEATURES, CLASSES, TREES, DEPTH = 20000, 60, 26, 5, 16
 STARTS = 20
 
 
-def forest_contest(seed=0):
+def forest_contest(seed: int = 0) -> Contest:
     """Return the Contest of predicting with the same trees, grown by scikit-learn."""
     rng = stage_rng(seed, 'bench/forest')
     x = rng.normal(size=(PIXELS, FEATURES)).astype(np.float32)
@@ -30,12 +34,12 @@ def forest_contest(seed=0):
                    lambda a, b: np.abs(a - b).max(), 0.01)
 
 
-def converted(grown):
+def converted(grown: RandomForestClassifier) -> Forest:
     """Return our Forest with the trees of a fitted scikit-learn forest."""
     columns, roots, base = [], [], 0
     for tree in (estimator.tree_ for estimator in grown.estimators_):
         roots.append(base)
-        # Ours wants siblings next to each other: number breadth first, children in pairs.
+        # Ours needs siblings next to each other: number breadth first, children in pairs.
         order, place = [0], {0: 0}
         for node in order:
             for child in (tree.children_left[node], tree.children_right[node]):
@@ -49,7 +53,7 @@ def converted(grown):
         base += len(order)
     feature, threshold, left, value = (np.concatenate(parts) for parts in zip(*columns))
     p = value / value.sum(axis=1, keepdims=True)
-    # sklearn compares float32 features with float64 thresholds: round down to keep the answer.
+    # sklearn compares float32 features with float64 thresholds: round down to keep the result.
     low = threshold.astype(np.float32)
     low = np.where(low > threshold, np.nextafter(low, np.float32(-np.inf)), low)
     return Forest(feature.astype(np.int32), low.astype(np.float32), left.astype(np.int32),
@@ -57,7 +61,7 @@ def converted(grown):
                   np.round(255 * p).astype(np.uint8))
 
 
-def icp_contest(scene, seed=0):
+def icp_contest(scene: BenchScene, seed: int = 0) -> Contest:
     """Return the Contest of aligning a generic model's points to a fragment."""
     rng = stage_rng(seed, 'bench/icp')
     model = max(scene.models, key=lambda m: m.volume)
@@ -71,12 +75,12 @@ def icp_contest(scene, seed=0):
     reach, steps = 0.03, 30
     registration = o3d.pipelines.registration
 
-    def ours():
+    def ours() -> list[Float64Array]:
         target = model_cloud(model)
         return [align(target, fragment, T, reach, steps, plane=True).T_target_source
                 for T in starts]
 
-    def open3d():
+    def open3d() -> list[Any]:
         target = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
         target.normals = o3d.utility.Vector3dVector(normals)
         source = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(fragment))
@@ -85,8 +89,8 @@ def icp_contest(scene, seed=0):
             registration.ICPConvergenceCriteria(1e-6, 1e-6, steps)).transformation
             for T in starts]
 
-    def disagreement(a, b):
-        # Median over the starts: at the reach's border one may keep a pair that the other drops.
+    def disagreement(a: list[Float64Array], b: list[Float64Array]) -> np.floating[Any]:
+        # Median over the starts: at the maximum distance one may keep a pair that the other drops.
         return np.median([np.linalg.norm(transform(p, fragment) - transform(q, fragment),
                                          axis=1).max() for p, q in zip(a, b)])
 

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a contest is run: the same work by several contestants, who must agree on the result."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from time import perf_counter as now
 import tracemalloc
+from typing import Any
 
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -20,11 +22,11 @@ class Contestant:
     One way to do the work.
 
     :ivar run: function without arguments; its result is compared by the contest.
-    :ivar share: part of the work that it does: a slow one may do a tenth, its time is scaled.
+    :ivar share: part of the work that it does: a slow one may do a tenth; its time is scaled.
     """
 
     name: str
-    run: object
+    run: Callable[[], Any]
     share: float = 1.0
 
 
@@ -33,7 +35,7 @@ class Contest:
     """
     One stage.
 
-    :ivar stage: short name; `work` says what is done once.
+    :ivar stage: short name; `work` describes one unit of work.
     :ivar contestants: ours first; the last one is the baseline of the ratios.
     :ivar disagreement: (result of ours, result of another) -> one number that must not exceed
         `tolerance`; None where results are not comparable.
@@ -41,19 +43,19 @@ class Contest:
 
     stage: str
     work: str
-    contestants: tuple
-    disagreement: object = None
+    contestants: tuple[Contestant, ...]
+    disagreement: Callable[[Any, Any], Any] | None = None
     tolerance: float = 0.0
 
 
 @dataclass(frozen=True)
 class Entry:
     """
-    What was measured of one contestant.
+    The measurements of one contestant.
 
     :ivar seconds: median over the runs, for the whole work.
     :ivar ratio: how many times faster than the contest's baseline.
-    :ivar peak_mb: most memory in use at once that Python and numpy asked for.
+    :ivar peak_mb: peak memory allocated by Python and numpy.
     :ivar disagreement: with ours; NaN for ours and where nothing is compared.
     """
 
@@ -67,12 +69,12 @@ class Entry:
     disagreement: float
 
 
-def hold(contest):
+def hold(contest: Contest) -> tuple[Entry, ...]:
     """
-    Return the tuple of Entry of a Contest, in its order.
+    Return the Entries of a Contest, in its order.
 
-    :raises HoocError: where a contestant's result differs from ours: then the times compare
-        different things.
+    :raises HoocError: where the result of a contestant differs from ours, so that the times
+        cannot be compared.
     """
     measured, ours = [], None
     for contestant in contest.contestants:
@@ -84,8 +86,8 @@ def hold(contest):
             difference = float(contest.disagreement(ours, result))
             if not difference <= contest.tolerance:
                 raise HoocError(f'{contest.stage}: {contestant.name} differs from ours by '
-                                f'{difference:.3g}, allowed is {contest.tolerance:.3g}; the '
-                                'times would not compare; run the tests of that stage')
+                                f'{difference:.3g}, more than {contest.tolerance:.3g}, so the '
+                                'times cannot be compared; run the tests of that stage')
         measured.append((contestant, seconds / contestant.share, runs, peak_mb, difference))
     baseline = measured[-1][1]
     return tuple(Entry(contest.stage, contest.work, contestant.name, seconds, baseline / seconds,
@@ -93,12 +95,12 @@ def hold(contest):
                  for contestant, seconds, runs, peak_mb, difference in measured)
 
 
-def _measure(run):
-    """Return (result, median s, number of runs, peak MB); the first run warms up, unmeasured."""
+def _measure(run: Callable[[], Any]) -> tuple[Any, float, int, float]:
+    """Return (result, median s, number of runs, peak MB); the first run is a warm-up."""
     start = now()
     result = run()
     first = now() - start
-    # A run that takes seconds is not repeated for the sake of caches that it has filled long ago.
+    # A run that takes seconds is not repeated: it has filled the caches long before its end.
     times = [first] if first > PATIENCE_S else []
     total = sum(times)
     while (len(times) < MIN_RUNS or total < MIN_SECONDS) and (
@@ -109,7 +111,7 @@ def _measure(run):
         total += times[-1]
     peak_mb = float('nan')
     if first < PATIENCE_S:
-        # Not while timing: it slows every allocation down.
+        # Not while timing, because it slows down every allocation.
         tracemalloc.start()
         run()
         peak_mb = tracemalloc.get_traced_memory()[1] / 2 ** 20

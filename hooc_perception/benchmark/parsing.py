@@ -2,14 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Contests of joint parsing: the energy, its search, the overlap of volumes."""
 
+from collections.abc import Sequence
+from typing import Any
+
 from hooc_perception.benchmark.measure import Contest, Contestant
-from hooc_perception.benchmark.scene import candidate_meshes
+from hooc_perception.benchmark.scene import BenchScene, candidate_meshes
+from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.energy.eq1 import D_MAX_M, Eq1
 from hooc_perception.core.energy.local_search import local_search
 from hooc_perception.core.energy.overlap import pairwise, union_shares
 from hooc_perception.core.geometry import matrix_from_pose, stage_rng
 from hooc_perception.core.methods.genetic import genetic_search, GeneticConfig
 from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import Candidates, GenericModel
 from hooc_perception.objects.repair import closed
 import manifold3d
 import numpy as np
@@ -20,18 +25,18 @@ EXACT_PAIRS = 60
 GENERATIONS = 60
 
 
-def random_subsets(n, count, seed=0):
+def random_subsets(n: int, count: int, seed: int = 0) -> BoolArray:
     """Return (count, n) bool subsets of about 20 members."""
     return stage_rng(seed, 'bench/subsets').random((count, n)) < 20 / n
 
 
-def energy_contest(scene):
-    """Return the Contest of evaluating Eq. 1 for subsets that have nothing in common."""
+def energy_contest(scene: BenchScene) -> Contest:
+    """Return the Contest of evaluating Eq. 1 for unrelated subsets."""
     energy = Eq1(scene.observation, scene.probabilities, scene.pool, scene.models)
     masks = random_subsets(len(scene.pool), SUBSETS)
     few = masks[:4]
 
-    def disagreement(a, b):
+    def disagreement(a: Float64Array, b: Float64Array) -> np.floating[Any]:
         return np.abs(a[:len(b)] - b).max()
 
     ours = Contestant('pixel lists in numba (ours)',
@@ -43,16 +48,16 @@ def energy_contest(scene):
                    (ours, dense), disagreement, 1e-3)
 
 
-def neighbours_contest(scene):
+def neighbours_contest(scene: BenchScene) -> Contest:
     """Return the Contest of evaluating all subsets that differ by one candidate."""
     energy = Eq1(scene.observation, scene.probabilities, scene.pool, scene.models)
     mask = random_subsets(len(scene.pool), 1)[0]
 
-    def incremental():
+    def incremental() -> Float64Array:
         energy.reset(mask)
         return energy.value + energy.deltas()
 
-    def afresh():
+    def afresh() -> Float64Array:
         flips = np.eye(len(mask), dtype=bool)
         return np.array([energy.evaluate(mask ^ flip) for flip in flips])
 
@@ -62,8 +67,8 @@ def neighbours_contest(scene):
         lambda a, b: np.abs(a - b).max(), 1e-6)
 
 
-def search_contest(scene, seed=0):
-    """Return the Contest of searching the best subset; see `search_quality` for how well."""
+def search_contest(scene: BenchScene, seed: int = 0) -> Contest:
+    """Return the Contest of searching the best subset; `search_quality` says how well."""
     energy = Eq1(scene.observation, scene.probabilities, scene.pool, scene.models, 1)
     return Contest('search a subset', f'{len(scene.pool)} candidates, Eq. 1', (
         Contestant('greedy and local search (ours)', lambda: local(energy, seed)),
@@ -71,28 +76,28 @@ def search_contest(scene, seed=0):
                    lambda: genetic(energy, scene.pool, seed))))
 
 
-def local(energy, seed):
-    """Return the mask that greedy and iterated local search end in."""
+def local(energy: Eq1, seed: int) -> BoolArray:
+    """Return the mask found by greedy and iterated local search."""
     energy.reset(np.zeros(energy.n, bool))
     return local_search(energy, stage_rng(seed, 'bench/local')).mask
 
 
-def genetic(energy, pool, seed):
-    """Return the mask that the genetic algorithm ends in."""
+def genetic(energy: Eq1, pool: Candidates, seed: int) -> BoolArray:
+    """Return the mask found by the genetic algorithm."""
     return genetic_search(energy.n, energy.evaluate, stage_rng(seed, 'bench/genetic'),
                           GeneticConfig(iterations=GENERATIONS), pool.category, 1)[0]
 
 
-def search_quality(scene, seed=0):
-    """Return {searcher: energy it reaches} on the contest's scene, and that of the truth."""
+def search_quality(scene: BenchScene, seed: int = 0) -> dict[str, float]:
+    """Return {search: energy that it reaches}, and the energy of the truth."""
     energy = Eq1(scene.observation, scene.probabilities, scene.pool, scene.models, 1)
     return {'greedy and local search': float(energy.evaluate(local(energy, seed))),
             'genetic algorithm': float(energy.evaluate(genetic(energy, scene.pool, seed))),
             'truth': float(energy.evaluate(scene.truth))}
 
 
-def dense_energy(scene, mask):
-    """Return Eq. 1 of a subset by drawing it and comparing whole images."""
+def dense_energy(scene: BenchScene, mask: BoolArray) -> float:
+    """Return Eq. 1 of a subset by rendering it and comparing whole images."""
     pool, models, probabilities = scene.pool, scene.models, scene.probabilities
     members = np.flatnonzero(mask)
     meshes = candidate_meshes(scene)
@@ -119,7 +124,7 @@ def dense_energy(scene, mask):
     return (depth_cost + miss_cost) / pixels + overlap
 
 
-def overlap_contest(scene):
+def overlap_contest(scene: BenchScene) -> Contest:
     """Return the Contest of the volumes that pairs of candidates share."""
     pool, models = scene.pool, scene.models
     shares = pairwise(pool, models)
@@ -128,7 +133,7 @@ def overlap_contest(scene):
     i, j = i[chosen], j[chosen]
     solids = {k: _solid(pool, models, k) for k in np.union1d(i, j)}
 
-    def exact():
+    def exact() -> Float64Array:
         return np.array([(solids[a] ^ solids[b]).volume() / solids[a].volume()
                          for a, b in zip(i, j)])
 
@@ -140,7 +145,7 @@ def overlap_contest(scene):
                    lambda a, b: np.abs(a - b).mean(), 0.05)
 
 
-def _solid(pool, models, k):
+def _solid(pool: Candidates, models: Sequence[GenericModel], k: int) -> manifold3d.Manifold:
     """Return the manifold3d solid of a candidate."""
     model = models[pool.category[k] - 1]
     mesh = closed(trimesh.Trimesh(model.vertices, model.faces, process=False))

@@ -1,16 +1,25 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The scene that all contests are about: like a HOOC scene of 20, from our own catalogue."""
+"""The scene of all contests: like a HOOC scene of 20 objects, from our own catalogue."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hooc_perception.core.arrays import AnyArray, BoolArray, Float64Array, Int32Array
 from hooc_perception.core.geometry import posed_vertices, stage_rng
 from hooc_perception.core.segment.observe import observe
-from hooc_perception.core.types import Candidates, Observation, PixelProbabilities
+from hooc_perception.core.types import (
+    Camera,
+    Candidates,
+    GenericModel,
+    Observation,
+    PixelProbabilities,
+    RectifiedView,
+)
 from hooc_perception.objects.catalogue import CATALOGUE
 from hooc_perception.objects.derive import derive
 from hooc_perception.synthesis.rigs import ring
-from hooc_perception.synthesis.scatter import ScatterConfig
+from hooc_perception.synthesis.scatter import PlacedObject, ScatterConfig
 from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -21,25 +30,25 @@ CANDIDATES_PER_CATEGORY = 5
 @dataclass(frozen=True)
 class BenchScene:
     """
-    A scene with everything that the stages hand on.
+    A scene with the inputs of all stages.
 
     :ivar cameras: three rectified Cameras of a Kinect v2's size.
-    :ivar meshes: list of (vertices (V, 3) world metres, faces (F, 3) int32) that stand there.
-    :ivar pool: five Candidates a category; one of each true object is its true pose.
+    :ivar meshes: (vertices (V, 3) world metres, faces (F, 3) int32) of the objects.
+    :ivar pool: five candidates per category; one of each true object is its true pose.
     :ivar truth: (n,) bool, which of the pool that is.
     """
 
-    models: tuple
-    cameras: tuple
-    meshes: list
-    views: tuple
+    models: tuple[GenericModel, ...]
+    cameras: Sequence[Camera]
+    meshes: list[tuple[Float64Array, Int32Array]]
+    views: Sequence[RectifiedView]
     observation: Observation
     probabilities: PixelProbabilities
     pool: Candidates
-    truth: np.ndarray
+    truth: BoolArray
 
 
-def bench_scene(seed=0, n_objects=20):
+def bench_scene(seed: int = 0, n_objects: int = 20) -> BenchScene:
     """Return the BenchScene of a seed; deterministic."""
     models = tuple(derive(name, build(), stage_rng(seed, 'bench/model', i))
                    for i, (name, build) in enumerate(CATALOGUE.items()))
@@ -54,7 +63,7 @@ def bench_scene(seed=0, n_objects=20):
                       _probabilities(observation, scene.labels, len(models), rng), pool, truth)
 
 
-def candidate_meshes(scene):
+def candidate_meshes(scene: BenchScene) -> list[tuple[Float64Array, Int32Array]]:
     """Return [(vertices world, faces)] of the pool of a BenchScene."""
     pool, out = scene.pool, []
     for k in range(len(pool)):
@@ -64,14 +73,15 @@ def candidate_meshes(scene):
     return out
 
 
-def _pool(objects, models, rng):
-    """Return (Candidates, truth): true poses, and others near by that compete with them."""
+def _pool(objects: Sequence[PlacedObject], models: Sequence[GenericModel],
+          rng: np.random.Generator) -> tuple[Candidates, BoolArray]:
+    """Return (Candidates, truth): true poses, and others nearby that compete with them."""
     true = {o.category: o for o in objects}
     rows, truth = [], []
     for category, model in enumerate(models, 1):
         for i in range(CANDIDATES_PER_CATEGORY):
             is_true = i == 0 and category in true
-            near = true[category] if is_true else objects[rng.integers(len(objects))]
+            near = true[category] if is_true else objects[int(rng.integers(len(objects)))]
             spread = 0.0 if is_true else 0.03
             turn = Rotation.from_rotvec([0, 0, 0 if is_true else rng.uniform(-np.pi, np.pi)])
             rows.append((category, near.translation + rng.normal(0, 1, 3) * [spread, spread, 0],
@@ -83,7 +93,8 @@ def _pool(objects, models, rng):
                       np.array(size, np.float32), np.ones(len(rows), np.float32)), np.array(truth)
 
 
-def _probabilities(observation, labels, n_classes, rng):
+def _probabilities(observation: Observation, labels: Sequence[AnyArray], n_classes: int,
+                   rng: np.random.Generator) -> PixelProbabilities:
     """Return PixelProbabilities of a mediocre classifier: 0.4 on the truth, the rest spread."""
     cameras, uv, p = [], [], []
     for i, (view, classes) in enumerate(zip(observation.views, labels)):

@@ -58,7 +58,7 @@ def run(args: Namespace) -> int:
         return 1
     models = {model.name: model for model in load_model_folder(root / MODEL).models}
     entry = load_results(results)['scenes'][0]
-    print('\n' + to_text(comparison(entry, BagScene(root / SCENE).truth, models)))
+    print('\n' + to_text(comparison(entry, BagScene(root / SCENE).truth or (), models)))
     print(f'\nresults: {results.resolve()}\nreport:  {(args.out / "report.html").resolve()}')
     return 0
 

@@ -46,9 +46,12 @@ def run(args: Namespace) -> None:
                            'match_timeout_s': args.wait}}
     with Supervisor((REPLAY,), parameters, args.namespace) as supervisor:
         status: dict[str, Any] = {}
-        supervisor.node.create_subscription(
-            String, 'replay/status', lambda message: status.update(json.loads(message.data)),
-            qos('replay/status'))
+
+        def on_status(message: String) -> None:
+            status.update(json.loads(message.data))
+
+        supervisor.node.create_subscription(String, 'replay/status', on_status,
+                                            qos('replay/status'))
         supervisor.bring_up()
         print(f'playing {bag.name}: cameras {", ".join(c.name for c in bag.cameras)}', flush=True)
         while status.get('state') not in ('finished', 'failed'):

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 import sys
-from typing import Any, TYPE_CHECKING
+from typing import Any, cast, TYPE_CHECKING
 
 from hooc_perception.chain import CHAIN, INGESTION, PARSING, REPLAY, STAGES_OF
 from hooc_perception.cli import options
@@ -165,7 +165,7 @@ def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
         runner = BagRunner(supervisor, args.timeout, getattr(args, 'record', None))
         used = supervisor.get_parameters(PARSING, ('profile', 'seed'))
         done = play_all(runner, tqdm(bags, desc='scenes', unit='scene', disable=None))
-    return *done, str(used['profile']), int(used['seed'])
+    return *done, cast(str, used['profile']), cast(int, used['seed'])
 
 
 def play_all(runner: 'BagRunner', bags: 'Iterable[BagScene]',

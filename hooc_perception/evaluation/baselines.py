@@ -103,11 +103,13 @@ class Fpfh:
     def scene(self, cloud: Cloud) -> tuple[Cloud, Any]:
         """Return (cloud, features)."""
         radius = self.config.feature_radius * self.config.voxel_m
-        return cloud, o3d.pipelines.registration.compute_fpfh_feature(
+        # The stub has no default for `indices`.
+        return cloud, o3d.pipelines.registration.compute_fpfh_feature(  # pyright: ignore[reportCallIssue]
             cloud, o3d.geometry.KDTreeSearchParamHybrid(radius, 100))
 
-    # Models and scenes are described alike.
-    model = scene
+    def model(self, cloud: Cloud) -> tuple[Cloud, Any]:
+        """Return (cloud, features): models and scenes are described alike."""
+        return self.scene(cloud)
 
     def poses(self, model: tuple[Cloud, Any], scene: tuple[Cloud, Any]) -> list[Float64Array]:
         """Return the best T_world_model, [] where there is none."""

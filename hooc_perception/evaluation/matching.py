@@ -8,6 +8,7 @@ from typing import Any
 
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import inverse, matrix_from_pose, pose_from_matrix
+from hooc_perception.core.types import Candidates
 from hooc_perception.errors import HoocError
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -50,6 +51,14 @@ def posed(thing: Any) -> PosedObject:
     except (TypeError, ValueError) as error:
         raise HoocError(f'object {get("category")!r} has no usable pose: {error}; give '
                         'translation (3), rotation_xyzw (4) and size (3)') from None
+
+
+def candidate_objects(candidates: Candidates, names: Sequence[str]) -> list[PosedObject]:
+    """Return Candidates as PosedObjects; `names` are those of class ids 1..N."""
+    return [PosedObject(names[int(c) - 1], candidates.translation[i],
+                        candidates.rotation_xyzw[i], candidates.size[i].astype(np.float64),
+                        float(candidates.score[i]))
+            for i, c in enumerate(candidates.category)]
 
 
 def in_frame_of(scene: Any, entry: dict[str, Any]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ from hooc_perception.core.types import (
     PixelProbabilities,
 )
 from hooc_perception.evaluation.errors import world_mesh
-from hooc_perception.evaluation.matching import PosedObject
+from hooc_perception.evaluation.matching import candidate_objects, PosedObject
 from hooc_perception.evaluation.scores import SceneScore, TIGHT_M
 import numpy as np
 
@@ -47,10 +47,7 @@ def as_candidates(objects: Iterable[PosedObject], models: Sequence[GenericModel]
 
 def as_objects(candidates: Candidates, models: Sequence[GenericModel]) -> list[PosedObject]:
     """Return Candidates as a list of PosedObject."""
-    return [PosedObject(models[int(c) - 1].name, candidates.translation[i],
-                        candidates.rotation_xyzw[i], candidates.size[i].astype(np.float64),
-                        float(candidates.score[i]))
-            for i, c in enumerate(candidates.category)]
+    return candidate_objects(candidates, [model.name for model in models])
 
 
 def true_classes(truths: Iterable[PosedObject], models: Sequence[GenericModel],

@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Damaged bags, messages, models: read, or refused in one sentence; what is not is seen."""
+"""Damaged bags, messages, models: read or rejected in one sentence; failures are noticed."""
 
 from hooc_perception.benchmark import fuzz as fuzzer
 from hooc_perception.benchmark.mutate import damaged
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 # Cases that failed once: (kind, number, seed).
-MENDED = [(kind, number, seed) for kind, cases in {
+FIXED = [(kind, number, seed) for kind, cases in {
     'messages of a stage': [(554, 1), (5, 0), (21, 0), (45, 0), (61, 0), (493, 0)],
     'sqlite bag': [(679, 0)], 'messages of a camera': [(832, 1)],
     'classifiers': [(46, 0), (58, 0), (178, 0), (342, 0)]}.items() for number, seed in cases]
@@ -36,7 +36,7 @@ def test_a_sample_of_all_kinds():
     assert outcomes == {fuzzer.READ, fuzzer.REJECTED}
 
 
-@pytest.mark.parametrize('kind, number, seed', MENDED)
+@pytest.mark.parametrize('kind, number, seed', FIXED)
 def test_what_failed_once_does_not_any_more(tmp_path, kind, number, seed):
     kinds = {kind: fuzzer.kinds_of_cases()[kind]}
     kind, outcome, text = fuzzer.run_case(number, seed, kinds, tmp_path)
@@ -50,8 +50,8 @@ def test_the_fuzzer_sees_every_way_to_fail(tmp_path, monkeypatch):
     result = fuzzer.fuzz(7, source='foes:foes')
     assert result.outcomes == {('a', 'rejected'): 1, ('g', 'read'): 1}
     texts = {number: text for number, _, text in result.failures}
-    assert 'no one sentence' in texts[1] and 'KeyError' in texts[2]
-    assert 'died' in texts[3] and 'no end' in texts[4] and 'asked for' in texts[5]
+    assert 'not one sentence' in texts[1] and 'KeyError' in texts[2]
+    assert 'died' in texts[3] and 'not finished' in texts[4] and 'requested' in texts[5]
 
 
 def test_damage_is_damage_and_the_same_for_a_seed():
@@ -70,5 +70,5 @@ def test_from_the_command_line(capsys, monkeypatch, tmp_path):
     assert main(['bench', 'fuzz', '--cases', '1', '--seed', '5']) == 0
     assert '1 cases of seed 5; 0 failed' in capsys.readouterr().out
     assert main(['bench', 'fuzz', '--cases', '2']) == 1
-    assert 'case 1 (b): no one sentence' in capsys.readouterr().out
+    assert 'case 1 (b): not one sentence' in capsys.readouterr().out
     assert main(['bench', 'fuzz', '--cases', '0']) == 1

@@ -7,9 +7,10 @@ from html.parser import HTMLParser
 import io
 
 from hooc_perception.core.types import Candidates, PixelProbabilities
-from hooc_perception.evaluation.report.page import report_html, window, write_report
+from hooc_perception.evaluation.report.page import report_html, write_report
 from hooc_perception.evaluation.report.pictures import colours, outline, residual_picture
 from hooc_perception.evaluation.report.scene import report_scene
+from hooc_perception.evaluation.report.views import window
 import numpy as np
 from PIL import Image
 import pytest

@@ -74,7 +74,7 @@ def _print(result: 'SoakResult') -> bool:
         grown = result.growth_mb(name)
         flat &= grown <= max(ALLOWED_MB, ALLOWED_SHARE * float(np.nanmedian(memory)))
         rows.append((name, f'{memory[0]:.0f}', f'{np.nanmax(memory):.0f}', f'{memory[-1]:.0f}',
-                     f'{grown:+.1f}', f'{result.growth_mb_an_hour(name):+.1f}'))
+                     f'{grown:+.1f}', f'{result.growth_mb_per_hour(name):+.1f}'))
     reasons = ', '.join(f'{thing.partition(": ")[2]} {reason} {number}' for (thing, reason), number
                         in sorted(result.reasons.items()))
     print(to_text(Table(

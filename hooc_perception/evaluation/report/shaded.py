@@ -1,7 +1,12 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Shaded pictures of posed objects on a piece of the table, two of them from one place."""
+"""Shaded pictures of posed objects on a part of the table."""
 
+from collections.abc import Sequence
+
+from hooc_perception.core.arrays import AnyArray, Float64Array, Int32Array, UInt8Array
+from hooc_perception.core.types import Camera
+from hooc_perception.evaluation.report.pictures import RGB
 from hooc_perception.objects.shaded import Orbit, render_shaded
 import numpy as np
 
@@ -11,11 +16,12 @@ ELEVATION_DEG = 42.0
 BORDER_M = 0.05
 
 
-def table_mesh(meshes, cells=24):
+def table_mesh(meshes: Sequence[tuple[AnyArray, AnyArray]],
+               cells: int = 24) -> tuple[Float64Array, Int32Array]:
     """Return (vertices, faces) of the table top below all meshes, with a border; z = 0."""
     points = np.concatenate([v for v, _ in meshes])
     low, high = points.min(0)[:2] - BORDER_M, points.max(0)[:2] + BORDER_M
-    # Several cells: a lamp is computed at corners, and large triangles would look flat.
+    # Several cells: shading is computed at corners, and large triangles would look flat.
     x, y = (np.linspace(a, b, cells + 1) for a, b in zip(low, high))
     grid = np.stack([*np.meshgrid(x, y, indexing='ij'), np.full((cells + 1,) * 2, -0.001)], -1)
     corner = (np.arange(cells)[:, None] * (cells + 1) + np.arange(cells)).ravel()
@@ -24,13 +30,15 @@ def table_mesh(meshes, cells=24):
     return grid.reshape(-1, 3), faces.astype(np.int32)
 
 
-def shaded_picture(meshes, colours, camera, framed, size=(640, 440)):
+def shaded_picture(meshes: Sequence[tuple[AnyArray, AnyArray]], colours: Sequence[RGB],
+                   camera: Camera, framed: Sequence[tuple[AnyArray, AnyArray]],
+                   size: tuple[int, int] = (640, 440)) -> UInt8Array:
     """
-    Return (h, w, 3) uint8: meshes in their colours on the table, from `camera`'s side.
+    Return (h, w, 3) uint8: meshes in their colours on the table, seen from `camera`.
 
     :param meshes: sequence of (vertices (V, 3) world metres, faces (F, 3)).
-    :param colours: one (r, g, b) 0..255 a mesh.
-    :param framed: the meshes that the picture is framed on, so that two pictures compare.
+    :param colours: one (r, g, b) 0..255 per mesh.
+    :param framed: the meshes that determine the frame, so that two pictures can be compared.
     """
     if not framed:
         return np.full((size[1], size[0], 3), BACKGROUND, np.uint8)

@@ -1,14 +1,21 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The data of the 3D view: measured points, posed models, what nothing explains."""
+"""The data of the 3D view: measured points, posed models, unexplained points."""
 
 import base64
+from collections.abc import Mapping, Sequence
 import json
+from typing import Any
 
+from hooc_perception.core.arrays import AnyArray, Float64Array
 from hooc_perception.core.geometry import back_project
 from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import GenericModel, Observation
 from hooc_perception.evaluation.errors import affine
+from hooc_perception.evaluation.matching import PosedObject
 from hooc_perception.evaluation.report import pictures
+from hooc_perception.evaluation.report.pictures import Palette, RGB
+from hooc_perception.evaluation.report.scene import ShownScene
 import numpy as np
 
 # As core.parsing.unexplained: a pixel within this distance of the composed objects is explained.
@@ -19,14 +26,13 @@ TABLE_RGB, UNEXPLAINED_RGB = (150, 154, 160), (255, 60, 60)
 
 
 class Meshes:
-    """The generic meshes that a page shows, each once however often it stands somewhere."""
+    """The generic meshes of a page, each stored once however often it is used."""
 
-    def __init__(self):
-        """Know no mesh yet."""
-        self._known = {}
+    def __init__(self) -> None:
+        self._known: dict[str, dict[str, Any]] = {}
 
-    def use(self, model):
-        """Return the name under which the page knows a GenericModel's mesh."""
+    def use(self, model: GenericModel) -> str:
+        """Store the mesh of a GenericModel; return its name on the page."""
         if model.name not in self._known:
             unit = model.vertices / np.maximum(model.extents, 1e-9) + 0.5
             wide = len(unit) > 65535
@@ -36,61 +42,60 @@ class Meshes:
                 'extents': [float(x) for x in model.extents]}
         return model.name
 
-    def json(self):
-        """Return the text of all meshes, fit to stand inside of a script element."""
+    def json(self) -> str:
+        """Return all meshes as JSON for a script element."""
         return script_json(self._known)
 
 
-def packed(values, kind):
-    """Return an array as base64 of little-endian numbers of a kind."""
+def packed(values: AnyArray, kind: type[np.generic]) -> str:
+    """Return an array as base64 of little-endian numbers of a type."""
     return base64.b64encode(np.ascontiguousarray(
         values, np.dtype(kind).newbyteorder('<')).tobytes()).decode()
 
 
-def script_json(content):
-    """Return JSON that no script element mistakes for its end."""
+def script_json(content: Any) -> str:
+    """Return JSON that cannot end the script element that contains it."""
     return json.dumps(content, allow_nan=False).replace('<', '\\u003c')
 
 
-def space_json(scene, drawn, meshes, true, rows, palette, store):
+def space_json(shown: ShownScene, rows: Sequence[Mapping[str, Any]], palette: Palette,
+               store: Meshes) -> str:
     """
-    Return the text of one scene's 3D view.
+    Return the JSON of the 3D view of one scene.
 
-    :param scene: ReportScene.
-    :param drawn: the PosedObjects that have a model, `meshes` as they stand, see `world_mesh`.
-    :param true: true PosedObjects that have a model.
-    :param rows: rows of the objects' table, for what is said of an object when it is picked.
-    :param store: Meshes of the page.
+    :param rows: rows of the objects' table, for the details of an object that is clicked.
+    :param store: the meshes of the page.
     """
-    colours = pictures.instance_colours(drawn, palette)
+    models, observation = shown.scene.models, shown.scene.observation
+    colours = pictures.instance_colours(shown.drawn, palette)
     facts = {row['k']: facts_of(row) for row in rows}
     objects = [{'name': o.category, 'colour': [int(c) for c in colours[k]],
-                'facts': facts.get(k, [])} | placed(o, scene.models[o.category], store)
-               for k, o in enumerate(drawn)]
-    truth = [{'name': o.category} | placed(o, scene.models[o.category], store) for o in true]
-    cloud, target = cloud_of(scene.observation, meshes, colours)
-    eye = scene.observation.views[0].camera.T_world_camera[:3, 3] - target
+                'facts': facts.get(k, [])} | placed(o, models[o.category], store)
+               for k, o in enumerate(shown.drawn)]
+    truth = [{'name': o.category} | placed(o, models[o.category], store) for o in shown.true]
+    cloud, target = cloud_of(observation, shown.meshes, colours)
+    eye = observation.views[0].camera.T_world_camera[:3, 3] - target
     return script_json({'objects': objects, 'truth': truth, 'cloud': cloud,
                         'target': [float(x) for x in target],
                         'azimuth': float(np.arctan2(eye[1], eye[0]))})
 
 
-def placed(thing, model, store):
-    """Return the mesh of a PosedObject and where it stands: the columns of A, then t, metres."""
+def placed(thing: PosedObject, model: GenericModel, store: Meshes) -> dict[str, Any]:
+    """Return the mesh of an object and its pose: the columns of A, then t, metres."""
     A, t = affine(thing, model)
     return {'mesh': store.use(model), 'at': [float(x) for x in (*A.T.ravel(), *t)]}
 
 
-def seen_points(observation, meshes, colours):
+def seen_points(observation: Observation, meshes: Sequence[tuple[AnyArray, AnyArray]],
+                colours: Sequence[RGB]) -> list[tuple[Float64Array, Float64Array]]:
     """
     Return [(points (n, 3) world, rgb (n, 3) float 0-255)] of three groups of readings.
 
-    They are the table, what objects explain (in the colour of their object), and what none
-    explains.
+    They are the table, points that an object explains (in its colour), and unexplained points.
 
-    :param meshes: the objects as they stand, see `world_mesh`; `colours` one (r, g, b) each.
+    :param meshes: posed objects, see `world_mesh`; `colours` one (r, g, b) each.
     """
-    groups = [[], [], []]
+    groups: list[list[tuple[Float64Array, Float64Array]]] = [[], [], []]
     for view in observation.views:
         points = back_project(view.depth, view.camera)
         depth, ids = render_depth(meshes, view.camera)
@@ -105,11 +110,13 @@ def seen_points(observation, meshes, colours):
             elif k == 2:
                 rgb[:] = UNEXPLAINED_RGB
             groups[k].append((points[mask], rgb * shade[mask][:, None]))
-    return [tuple(np.concatenate(part) for part in zip(*group)) for group in groups]
+    return [(np.concatenate([points for points, _ in group]),
+             np.concatenate([rgb for _, rgb in group])) for group in groups]
 
 
-def extent_of(explained, left, meshes):
-    """Return (low, high) (3,) corners around what stands there, metres in the world."""
+def extent_of(explained: Float64Array, left: Float64Array,
+              meshes: Sequence[tuple[AnyArray, AnyArray]]) -> Float64Array:
+    """Return (2, 3) the low and high corners around all objects, metres in the world."""
     standing = np.concatenate([explained, left, *(v for v, _ in meshes)])
     standing = standing[np.isfinite(standing).all(1)]
     if not len(standing):
@@ -117,8 +124,9 @@ def extent_of(explained, left, meshes):
     return np.percentile(standing, [1, 99], axis=0) + np.array([[-BORDER_M], [BORDER_M]])
 
 
-def cloud_of(observation, meshes, colours):
-    """Return (dict of the `seen_points` near the objects, (3,) middle of what stands there)."""
+def cloud_of(observation: Observation, meshes: Sequence[tuple[AnyArray, AnyArray]],
+             colours: Sequence[RGB]) -> tuple[dict[str, Any], Float64Array]:
+    """Return (dict of the `seen_points` near the objects, (3,) middle of the objects)."""
     table, explained, left = seen_points(observation, meshes, colours)
     low, high = extent_of(explained[0], left[0], meshes)
     foreground = len(explained[0]) + len(left[0])
@@ -134,20 +142,20 @@ def cloud_of(observation, meshes, colours):
             'rgb': packed(rgb.clip(0, 255), np.uint8)}, (low + high) / 2
 
 
-def facts_of(row):
+def facts_of(row: Mapping[str, Any]) -> list[list[str]]:
     """Return [(label, text)] of a row of the objects' table."""
-    def number(value, digits, unit):
+    def number(value: float | None, digits: int, unit: str) -> str | None:
         return None if value is None else f'{value:.{digits}f}{unit}'
 
-    def triple(values):
+    def triple(values: Sequence[float]) -> str:
         return ' '.join(f'{v:.1f}' for v in values) + ' cm'
 
     ratio, residual = row['visible_ratio'], row['residual_m']
     facts = [('score', number(row['score'], 2, '')), ('position', triple(row['at'])),
              ('size', triple(row['size'])),
-             ('in sight', number(None if ratio is None else 100 * ratio, 0, ' %')),
+             ('visible', number(None if ratio is None else 100 * ratio, 0, ' %')),
              ('residual', number(None if residual is None else 1000 * residual, 1, ' mm')),
              ('views', number(row['n_views'], 0, '')),
              ('error', number(row['error_mm'], 0, ' mm')),
-             ('turned', number(row['turn'], 0, '°'))]
-    return [list(fact) for fact in facts if fact[1] is not None]
+             ('rotation', number(row['turn'], 0, '°'))]
+    return [[name, text] for name, text in facts if text is not None]

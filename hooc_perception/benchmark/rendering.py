@@ -109,8 +109,8 @@ def cast_patch(vertices: AnyArray, faces: AnyArray, camera: Camera) -> Patch:
 
 
 def _tensor(array: AnyArray) -> o3d.core.Tensor:
-    """Return an array as a tensor."""
-    return o3d.core.Tensor(array)  # pyright: ignore[reportCallIssue, reportArgumentType] (stub)
+    """Return an array as a tensor; the stub has no default for its type and device."""
+    return o3d.core.Tensor(array)  # pyright: ignore[reportCallIssue]
 
 
 def _cast(scene: o3d.t.geometry.RaycastingScene, camera: Camera, rows: slice,

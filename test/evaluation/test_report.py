@@ -101,7 +101,7 @@ def test_every_picture_decodes_and_shows_something(html):
 
 def test_scenes_objects_and_verdicts_are_told(html):
     text = ' '.join(' '.join(Page(html).text).split())
-    for word in ('10_1', '10_2', 'ball', 'can', 'too far off', 'missed', 'stopped by its deadline',
+    for word in ('10_1', '10_2', 'ball', 'can', 'too far off', 'missed', 'stopped at its deadline',
                  'Rejected candidates', 'most likely class', 'profile & seed', '200 mm', '80 %'):
         assert word in text, word
     assert '<b>title</b>' not in html
@@ -120,7 +120,7 @@ def test_outlines_follow_the_objects(html, tiny):
 def test_empty_scene_and_empty_page(tiny, models):
     empty = report_scene({'scene': 'bare', 'objects': [], 'energy': None, 'seconds': None},
                          tiny.scene('nobody').depth(), models)
-    assert 'Nothing was found' in report_html([empty])
+    assert 'No objects were found' in report_html([empty])
     assert Page(report_html([])).open == []
 
 

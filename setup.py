@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""What pyproject.toml cannot say: the version of package.xml, and the files of share/."""
+"""What pyproject.toml cannot say so that colcon reads it too; the files of share/."""
 
 from glob import glob
 import os
@@ -23,6 +23,7 @@ def tree(folder: str) -> list[tuple[str, list[str]]]:
 setup(
     version=MANIFEST.findtext('version'),
     license=MANIFEST.findtext('license'),
+    python_requires='>=3.11',
     data_files=[
         ('share/ament_index/resource_index/packages', ['resource/' + NAME]),
         ('share/' + NAME, ['package.xml']),

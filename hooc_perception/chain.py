@@ -22,10 +22,9 @@ NODES = (*CHAIN, REPLAY)
 PROFILES = ('paper', 'best', 'fast')
 STAGES = ('observe', 'classify', 'propose', 'parse')
 # The stages whose parameters a node declares. Candidates are ranked by the pixel costs of `parse`,
-# and parsing proposes again: both declare both.
-STAGES_OF = {INGESTION: ('observe',), CLASSIFICATION: ('observe', 'classify'),
-             CANDIDATES: ('observe', 'propose', 'parse'),
-             PARSING: ('observe', 'propose', 'parse'), REPLAY: ()}
+# and parsing proposes again: both nodes declare both.
+STAGES_OF = {INGESTION: ('observe',), CLASSIFICATION: ('classify',),
+             CANDIDATES: ('propose', 'parse'), PARSING: ('propose', 'parse'), REPLAY: ()}
 
 
 @dataclass(frozen=True)
@@ -54,7 +53,9 @@ TOPICS = {
     '<camera>/extrinsics': Topic(1, latched=True),
     'views/<camera>/depth_rect': Topic(4, False, INGESTION, _LATER),
     'views/<camera>/camera_info': Topic(4, True, INGESTION, _LATER),
-    'views/<camera>/extrinsics': Topic(4, True, INGESTION, _LATER),
+    'views/<camera>/segments': Topic(4, False, INGESTION, _LATER),
+    'views/poses': Topic(4, False, INGESTION, _LATER),
+    'views/<camera>/extrinsics': Topic(4, True, INGESTION),
     'views/<camera>/count': Topic(1, False, INGESTION),
     'views/points': Topic(1, False, INGESTION),
     'views/refused': Topic(4, needed_by=(INGESTION,)),
@@ -74,6 +75,11 @@ TOPICS = {
     '/planning_scene': Topic(10),
     'replay/status': Topic(1, True, REPLAY),
 }
+
+
+def node_class(node: str) -> str:
+    """Return the name of the class in a node's module: ParsingNode for parsing_node."""
+    return ''.join(word.capitalize() for word in node.split('_'))
 
 
 def topic_token(name: str) -> str:

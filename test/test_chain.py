@@ -4,8 +4,8 @@
 
 import ast
 from pathlib import Path
-import re
 import sys
+import tomllib
 
 from hooc_perception import chain
 from hooc_perception.core.profiles import Profile, profile
@@ -25,7 +25,8 @@ def test_it_imports_nothing_that_launch_files_lack():
 def test_every_node_has_a_module_and_an_executable():
     folder = ROOT / 'hooc_perception' / 'nodes'
     assert {path.stem for path in folder.glob('*_node.py')} == set(chain.NODES)
-    assert re.findall(r"'(\w+_node)'", (ROOT / 'setup.py').read_text()) == list(chain.NODES)
+    scripts = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']['scripts']
+    assert [name for name in scripts if name.endswith('_node')] == list(chain.NODES)
 
 
 def test_every_profile_and_stage_exists():

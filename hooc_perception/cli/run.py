@@ -133,7 +133,7 @@ def chain_parameters(args: Namespace, model: 'ModelFolder') -> dict[str, dict[st
         stage, _, name = key.partition('.')
         for node in (n for n in CHAIN if stage in STAGES_OF[n]):
             # As the Config holds it: 2 for a float has become 2.0, which ROS requires.
-            parameters[node][key] = getattr(getattr(changed, stage), name)
+            parameters[node][key] = changed.stage(stage).values()[name]
     return parameters
 
 

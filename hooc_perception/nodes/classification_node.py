@@ -1,73 +1,88 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Stage 2: rectified frame sets -> class probabilities of the foreground pixels."""
+"""Stage 2: observed frame sets -> class probabilities of the foreground pixels."""
 
+from collections.abc import Sequence
 import sys
 import time
+from typing import Any
 
-from hooc_perception.chain import CLASSIFICATION, STAGES_OF
+from hooc_perception.chain import CLASSIFICATION
 from hooc_perception.core.classification.classify import KIND_PAPER
-from hooc_perception.core.segment.checks import rig_trouble
-from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.checks import rig_size_trouble, rig_trouble
+from hooc_perception.core.types import Observation
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of, node_profile, parser_of
 from hooc_perception.nodes.warm_up import warmed
-from hooc_perception.ros.inputs.view_topics import ViewInput
+from hooc_perception.ros.inputs.view_input import ViewInput
 from hooc_perception.ros.lifecycle.spin import run_node
-from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.lifecycle.stage_config import StageConfig
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, labels_message
 from hooc_perception.ros.messages.stages import label_images, probabilities_message
 import numpy as np
 from sensor_msgs.msg import Image, PointCloud2
 
 
-class ClassificationNode(StageNode):
-    """Observe, classify, publish pixels/*."""
+class ClassificationNode(StageNode[StageConfig, 'Classification']):
+    """Classify, publish pixels/*."""
 
-    def __init__(self, **kwargs):
+    def __init__(self, **kwargs: Any) -> None:
         """Declare parameters."""
-        super().__init__(CLASSIFICATION, StageConfig(), STAGES_OF[CLASSIFICATION], **kwargs)
+        super().__init__(CLASSIFICATION, **kwargs)
 
-    def configure(self):
+    def configure(self) -> 'Classification':
         """Load the classifier, build the endpoints."""
-        model = model_of(self)
-        self.names = camera_names(self, model)
-        self.classes, self.classifier = [m.name for m in model.models], model.classifier
-        # The paper's forests look into all views at once, from where they were trained.
-        self.trained = model.cameras if np.array_equal(
-            self.classifier.get('kind'), KIND_PAPER) else ()
-        if self.trained and len(self.names) != len(self.trained):
-            raise HoocError(rig_trouble(self.names, self.trained))
-        self.model, self.parser = model, parser_of(self, model)
-        warmed(self, model, lambda views, *_: self.parser.classify(
-            observe(views, self.parameters['observe'])))
-        self.probabilities = self.publisher(PointCloud2, 'pixels/probabilities')
-        self.labels = [self.publisher(Image, 'pixels/<camera>/labels', f'pixels/{name}/labels')
-                       for name in self.names]
-        self.input = ViewInput(self, self.names, 'classify', {}, self.on_views)
+        return Classification(self)
 
-    def on_views(self, stamp_ns, observation, messages):
+
+class Classification:
+    """The work of a configured classification node."""
+
+    def __init__(self, node: ClassificationNode) -> None:
+        """Build everything on the node."""
+        self._node, self._model = node, model_of(node)
+        model = self._model
+        self._names, self._classes = camera_names(node, model), [m.name for m in model.models]
+        # The paper's forests look into all views at once, from where they were trained.
+        self._trained = model.cameras if np.array_equal(
+            model.classifier.get('kind', -1), KIND_PAPER) else ()
+        if self._trained and (trouble := rig_size_trouble(self._names, self._trained)):
+            raise HoocError(trouble)
+        self._parser = parser_of(node, model)
+        warmed(node, model, lambda observation, *_: self._parser.classify(observation))
+        self._probabilities = node.publisher(PointCloud2, 'pixels/probabilities')
+        self._labels = [
+            node.publisher(Image, 'pixels/<camera>/labels', f'pixels/{name}/labels')
+            for name in self._names]
+        self.input = ViewInput(node, self._names, 'classify', {}, self._on_views)
+
+    def _on_views(self, stamp_ns: int, observation: Observation,
+                  messages: dict[str, Any]) -> None:
         """Classify one frame set."""
-        start = time.monotonic()
-        head = header(stamp_ns, self.config.target_frame)
-        trouble = self.trained and rig_trouble([v.camera for v in observation.views],
-                                               self.trained)
-        if trouble:
-            self.diagnostics.warn('model', 'other_rig', trouble)
-        else:
-            self.diagnostics.ok('model')
-        self.parser = self.parser.changed(node_profile(self, self.model))
-        probabilities = self.parser.classify(observation)
-        self.probabilities.publish(
-            probabilities_message(probabilities, observation, self.classes, head))
+        start, diagnostics = time.monotonic(), self._node.diagnostics
+        self._check_rig(observation)
+        self._parser = self._parser.changed(node_profile(self._node, self._model))
+        probabilities = self._parser.classify(observation)
+        self._probabilities.publish(probabilities_message(
+            probabilities, observation, self._classes,
+            header(stamp_ns, self._node.config.target_frame)))
         seconds = time.monotonic() - start
         images = label_images(probabilities, observation)
-        for name, publisher, image in zip(self.names, self.labels, images):
+        for name, publisher, image in zip(self._names, self._labels, images):
             publisher.publish(labels_message(image, header(stamp_ns, messages['frames'][name])))
-        self.diagnostics.ok('classify', seconds=seconds, pixels=len(probabilities.camera))
+        diagnostics.ok('classify', seconds=seconds, pixels=len(probabilities.camera))
+
+    def _check_rig(self, observation: Observation) -> None:
+        """Report cameras that do not stand where a view-bound classifier was trained."""
+        cameras = [view.camera for view in observation.views]
+        if self._trained and (trouble := rig_trouble(cameras, self._trained)):
+            self._node.diagnostics.warn('model', 'other_rig', trouble)
+        else:
+            self._node.diagnostics.ok('model')
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return the exit code."""
     return run_node(ClassificationNode, args)
 

@@ -2,24 +2,33 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stage 4: candidates -> the objects that together explain the frame set."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 import json
 import sys
 import time
+from typing import Any
 
 from geometry_msgs.msg import PoseArray
-from hooc_perception.chain import PARSING, STAGES_OF
+from hooc_perception.chain import PARSING
 from hooc_perception.core.config import param
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.parsing.tracking import TrackConfig, Tracker
 from hooc_perception.core.parsing.unexplained import unexplained_points
-from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.types import (
+    Candidates,
+    GenericModel,
+    Observation,
+    ParsedScene,
+    PixelProbabilities,
+)
 from hooc_perception.nodes.model import camera_names, model_of, node_profile, parser_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.health.diagnostics import WARN
-from hooc_perception.ros.inputs.view_topics import ViewInput
+from hooc_perception.ros.inputs.view_input import ViewInput
 from hooc_perception.ros.lifecycle.spin import run_node
-from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.lifecycle.stage_config import StageConfig
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.stages import (
     candidates_from_messages,
     probabilities_from_message,
@@ -36,140 +45,165 @@ from std_srvs.srv import SetBool, Trigger
 class ParsingConfig(AdapterConfig, TrackConfig, StageConfig):
     """Parameters of the parsing node."""
 
-    max_instances: int = param(-1, 'Objects of one category in a scene at most; 0 sets no '
-                               "limit, -1 takes the model's.", '', -1, 1000)
-    sigmas: bool = param(True, 'Estimate sigma_t and sigma_r, for about 0.05 CPU seconds an '
+    max_instances: int = param(-1, 'Maximum number of objects per category in a scene; 0 = no '
+                               'limit, -1 = the limit of the model.', '', -1, 1000)
+    sigmas: bool = param(True, 'Estimate sigma_t and sigma_r, at about 0.05 CPU seconds per '
                          'object.', runtime=True)
-    keep_answer_s: float = param(0.0, 'An answer that no new one has followed for so long is '
-                                 'taken back, as if by `reset`: nobody watches what it speaks '
-                                 'of. 0 = it stays.', 's', 0.0, 86400.0, runtime=True)
+    keep_answer_s: float = param(0.0, 'A result is retracted after this time without a '
+                                 'successor, as by `reset`; 0 = never.', 's', 0.0, 86400.0,
+                                 runtime=True)
     detect_timeout_s: float = param(30.0, 'The detect service gives up after this time.', 's',
                                     0.1, 600.0, runtime=True)
 
 
-class ParsingNode(StageNode):
+class ParsingNode(StageNode[ParsingConfig, 'Parsing']):
     """Join everything of one stamp, parse, publish objects/*."""
 
-    def __init__(self, **kwargs):
-        """Declare parameters."""
-        super().__init__(PARSING, ParsingConfig(), STAGES_OF[PARSING], **kwargs)
-        self.detect = DetectService(self, lambda: None if self.enabled else (
+    CONFIG = ParsingConfig
+
+    def __init__(self, **kwargs: Any) -> None:
+        """Declare parameters; offer `detect` in every lifecycle state."""
+        super().__init__(PARSING, **kwargs)
+        self.detect = DetectService(self, lambda: None if self.work.enabled else (
             'frame sets are ignored: call enable with true'))
 
-    def configure(self):
+    def configure(self) -> 'Parsing':
         """Load the generic models, build the endpoints."""
-        model = model_of(self)
-        self.models, self.enabled = model.models, True
-        limit = self.config.max_instances
-        self.model = model
-        self.parser = parser_of(self, model, model.max_instances if limit < 0 else limit,
-                                self.config.sigmas)
-        warmed(self, model, self.try_out)
-        self.tracker = Tracker(model.models, self.config)
-        self.output = ObjectOutput(self, model.models, [
+        return Parsing(self)
+
+    def activate(self) -> None:
+        """Publish what the class ids mean."""
+        self.work.output.announce()
+
+    def deactivate(self) -> None:
+        """Retract the result, which nobody keeps up to date any more, and let nobody wait."""
+        self.detect.fail('the node was deactivated')
+        self.work.retract()
+
+    def cleanup(self) -> None:
+        """Begin anew with the next configuration."""
+        self.detect.forget()
+
+
+class Parsing:
+    """
+    The work of a configured parsing node.
+
+    :ivar models: generic models; class id c is models[c - 1].
+    :ivar enabled: whether frame sets are parsed.
+    :ivar output: the topics of the result.
+    :ivar adapters: forms of the result for other packages.
+    """
+
+    def __init__(self, node: ParsingNode) -> None:
+        """Build everything on the node."""
+        self._node, self._model = node, model_of(node)
+        self.models, model, self.enabled = self._model.models, self._model, True
+        limit = node.config.max_instances
+        self._parser = parser_of(node, model, model.max_instances if limit < 0 else limit,
+                                 node.config.sigmas)
+        warmed(node, model, self._try_out)
+        self._tracker = Tracker(model.models, node.config)
+        self.output = ObjectOutput(node, model.models, [
             (model.mesh_path(m.name).resolve().as_uri(), model.mesh_sha256[m.name])
             for m in model.models])
-        self.input = ViewInput(self, camera_names(self, model), 'parse', {
+        self.input = ViewInput(node, camera_names(node, model), 'parse', {
             'probabilities': (PointCloud2, 'pixels/probabilities'),
             'poses': (PoseArray, 'candidates/poses'),
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set,
             lambda: self.enabled)
-        self.adapters = adapters_of(self)
-        self.answered = None        # monotonic s of the answer that stands, None: there is none
-        self.steady_timer(0.5, self.on_timer)
-        self.owned(self.destroy_service, self.create_service(SetBool, 'enable', self.on_enable))
-        self.owned(self.destroy_service, self.create_service(Trigger, 'reset', self.on_reset))
+        self.adapters = adapters_of(node)
+        # Monotonic seconds of the result that stands; None: there is none.
+        self._answered: float | None = None
+        node.steady_timer(0.5, self._on_timer)
+        node.owned(node.destroy_service,
+                   node.create_service(SetBool, 'enable', self._on_enable))
+        node.owned(node.destroy_service,
+                   node.create_service(Trigger, 'reset', self._on_reset))
 
-    def try_out(self, views, probabilities, candidates, models):
-        """Parse a made-up scene."""
-        observation = observe(views, self.parameters['observe'])
+    def _try_out(self, observation: Observation, probabilities: PixelProbabilities,
+                 candidates: Candidates, models: tuple[GenericModel, ...]) -> None:
+        """Parse a synthetic scene."""
         frame = Frame(observation, probabilities, models)
-        parsed = self.parser.method.parse(frame, candidates, self.config.seed,
-                                          self.parser.max_instances)
+        parsed = self._parser.method.parse(frame, candidates, self._node.config.seed,
+                                           self._parser.max_instances)
         unexplained_points(observation, parsed.objects, models)
 
-    def activate(self):
-        """Say what the class ids mean."""
-        self.output.announce()
-
-    def deactivate(self):
-        """Take back the answer, which nobody watches any more, and let nobody wait."""
-        self.detect.fail('the node was deactivated')
-        self.take_back()
-
-    def cleanup(self):
-        """Begin anew with the next configuration."""
-        self.detect.forget()
-
-    def on_set(self, stamp_ns, observation, messages):
-        """Parse one frame set."""
-        start = time.monotonic()
+    def _parsed(self, observation: Observation, messages: dict[str, Any]) -> ParsedScene:
+        """Return the ParsedScene of what came together for one stamp."""
         n = len(self.models)
         probabilities = probabilities_from_message(messages['probabilities'], observation, n)
-        self.parser = self.parser.changed(node_profile(self, self.model), self.config.sigmas)
-        parsed = self.parser.decide(
-            self.parser.frame(observation, probabilities),
-            candidates_from_messages(messages['poses'], messages['attributes'], n),
-            self.config.seed)
-        self.tracker.config = self.config
-        ids, objects = self.tracker.update(stamp_ns, parsed.objects)
+        pool = candidates_from_messages(messages['poses'], messages['attributes'], n)
+        self._parser = self._parser.changed(node_profile(self._node, self._model),
+                                            self._node.config.sigmas)
+        return self._parser.decide(self._parser.frame(observation, probabilities), pool,
+                                   self._node.config.seed)
+
+    def on_set(self, stamp_ns: int, observation: Observation, messages: dict[str, Any]) -> None:
+        """Parse one frame set and publish the result."""
+        node, start = self._node, time.monotonic()
+        parsed, frame = self._parsed(observation, messages), node.config.target_frame
+        self._tracker.config = node.config
+        ids, objects = self._tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
         left = unexplained_points(observation, objects, self.models)
-        scene = detected_scene(parsed, ids, self.models, stamp_ns, self.config.target_frame)
-        age_s = (self.now_ns() - stamp_ns) * 1e-9
-        self.output.publish(parsed, ids, stamp_ns, self.config.target_frame, age_s, left)
-        self.answered = time.monotonic()
-        tell(self, self.adapters, 'publish', scene)
-        self.detect.answer(scene)
-        self.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
+        scene = detected_scene(parsed, ids, self.models, stamp_ns, frame)
+        age_s = (node.now_ns() - stamp_ns) * 1e-9
+        self.output.publish(parsed, ids, stamp_ns, frame, age_s, left)
+        self._answered = time.monotonic()
+        tell(node, self.adapters, 'publish', scene)
+        node.detect.answer(scene)
+        node.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
                             energy=float(parsed.energy.total), age_s=age_s)
 
-    def on_enable(self, request, response):
-        """Let frame sets be parsed, or ignore them."""
+    def retract(self) -> None:
+        """Publish that nothing is known any more; objects that return in time keep their ids."""
+        self._answered = None
+        now = self._node.now_ns(), self._node.config.target_frame
+        self.output.clear(*now)
+        tell(self._node, self.adapters, 'clear', *now)
+
+    def _on_enable(self, request: SetBool.Request,
+                   response: SetBool.Response) -> SetBool.Response:
+        """Parse frame sets, or ignore them."""
         before, self.enabled = self.enabled, request.data
         if self.enabled and not before:
             self.input.wait()
             self.input.resume()
         elif not self.enabled:
-            self.say_disabled()
-            self.detect.fail('frame sets are ignored from now on')
+            self._report_disabled()
+            self._node.detect.fail('frame sets are ignored from now on')
         response.success = True
         response.message = 'parsing' if self.enabled else 'frame sets are ignored'
         return response
 
-    def on_timer(self):
-        """Take back an answer that has grown old."""
-        keep = self.config.keep_answer_s
-        if self.active and keep and self.answered and time.monotonic() - self.answered > keep:
-            self.diagnostics.warn('parse', 'answer_expired', 'no frame set has come for '
-                                  f'{keep:g} s (keep_answer_s); the last answer is taken back')
-            self.take_back()
-            if not self.enabled:
-                self.say_disabled()
-
-    def say_disabled(self):
-        """Say in /diagnostics why there are no answers."""
-        self.diagnostics.state('parse', 'disabled', 'frame sets are ignored: call enable with '
-                               'true', WARN)
-
-    def on_reset(self, request, response):
-        """Forget what waits to be joined and what was seen; take the last answer back."""
+    def _on_reset(self, request: Trigger.Request,
+                  response: Trigger.Response) -> Trigger.Response:
+        """Forget what waits to be joined and what was seen; retract the last result."""
         self.input.clear()
-        self.tracker.forget()
-        if self.active:
-            self.take_back()
+        self._tracker.forget()
+        if self._node.active:
+            self.retract()
         response.success, response.message = True, json.dumps({'objects': 0})
         return response
 
-    def take_back(self):
-        """Publish that nothing is known any more; ids stay with what returns in time."""
-        self.answered = None
-        now = self.now_ns(), self.config.target_frame
-        self.output.clear(*now)
-        tell(self, self.adapters, 'clear', *now)
+    def _on_timer(self) -> None:
+        """Retract a result that has grown old."""
+        node, keep = self._node, self._node.config.keep_answer_s
+        if node.active and keep and self._answered and time.monotonic() - self._answered > keep:
+            node.diagnostics.warn('parse', 'answer_expired', 'no frame set has come for '
+                                  f'{keep:g} s (keep_answer_s); the last result is retracted')
+            self.retract()
+            if not self.enabled:
+                self._report_disabled()
+
+    def _report_disabled(self) -> None:
+        """Report in /diagnostics why there are no results."""
+        self._node.diagnostics.state('parse', 'disabled', 'frame sets are ignored: call enable '
+                                     'with true', WARN)
 
 
-def main(args=None):
+def main(args: Sequence[str] | None = None) -> int:
     """Run the node; return the exit code."""
     return run_node(ParsingNode, args)
 

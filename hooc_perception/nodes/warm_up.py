@@ -1,42 +1,56 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-A small made-up scene, on which a node tries its stage while it is configured.
+A small synthetic scene, on which a node tries its stage while it is configured.
 
-Compiled code is loaded (the first time ever: compiled) at the first call, which would make the
-first real answer late, and a model that does not fit is found out before it is needed.
+Compiled code is loaded (the first time ever: compiled) at the first call, which would delay the
+first real result; and a model that does not fit is noticed before it is needed.
 """
 
+from collections.abc import Callable, Sequence
 import time
+from typing import Any
 
 from hooc_perception.core.geometry import inverse, posed_vertices, rays
 from hooc_perception.core.render import render_depth
-from hooc_perception.core.types import Camera, Candidates, PixelProbabilities, RectifiedView
+from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.types import (
+    Camera,
+    Candidates,
+    GenericModel,
+    Observation,
+    PixelProbabilities,
+    RectifiedView,
+)
+from hooc_perception.ros.lifecycle.stage_config import StageConfig
+from hooc_perception.ros.lifecycle.stage_node import StageNode
+from hooc_perception.trained.folder import ModelFolder
 import numpy as np
 
 MOST_MODELS = 3
 
 
-def warmed(node, model, stage):
-    """
-    Call `stage(views, probabilities, candidates, models)` on the made-up scene; time it.
+Stage = Callable[[Observation, PixelProbabilities, Candidates, tuple[GenericModel, ...]], object]
 
-    Not where the node's parameter warm_up is false.
-    """
+
+def warmed(node: StageNode[StageConfig, Any], model: ModelFolder, stage: Stage) -> None:
+    """Call a stage on the synthetic scene and time it, if the parameter warm_up is true."""
     if not node.config.warm_up:
         return
     start = time.monotonic()
-    stage(*made_up_scene(model.models, model.cameras))
+    views, probabilities, candidates, models = made_up_scene(model.models, model.cameras)
+    stage(observe(views), probabilities, candidates, models)
     node.diagnostics.ok('warm_up', seconds=time.monotonic() - start)
 
 
-def made_up_scene(models, cameras):
+def made_up_scene(models: Sequence[GenericModel], cameras: Sequence[Camera]) -> tuple[
+        tuple[RectifiedView, ...], PixelProbabilities, Candidates, tuple[GenericModel, ...]]:
     """
     Return (views, probabilities, candidates, models) of the first few models on a table.
 
-    :param cameras: sequence of Camera with poses; an overhead one stands in for none.
-    :return: tuple of RectifiedView, the true PixelProbabilities and Candidates, and the
-        models, whose class ids count from 1.
+    :param cameras: with poses; if there are none, an overhead camera takes their place.
+    :return: the views, the true probabilities and candidates, and the models; class ids count
+        from 1.
     """
     models = tuple(models[:MOST_MODELS])
     n = len(models)
@@ -68,7 +82,7 @@ def made_up_scene(models, cameras):
             candidates, models)
 
 
-def overhead_camera():
+def overhead_camera() -> Camera:
     """Return a small camera that looks straight down from 1 m."""
     return Camera('overhead', 160, 120, np.array([[150.0, 0, 79.5], [0, 150, 59.5], [0, 0, 1]]),
                   np.zeros(5), np.array([[1.0, 0, 0, 0], [0, -1, 0, 0], [0, 0, -1, 1],

@@ -6,9 +6,11 @@ from dataclasses import replace
 import time
 
 from hooc_perception.core.geometry import pose_from_matrix
+from hooc_perception.core.methods.joint import JointMethod
 from hooc_perception.core.types import Energy, ParsedScene
 from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera
 from hooc_perception.objects.derive import derive
+from hooc_perception.parser import Parser
 from hooc_perception.trained.folder import save_model_folder
 import numpy as np
 import pytest
@@ -96,22 +98,28 @@ class Stages:
         self.views, self.p, self.candidates, self.models = scene
         self.given, self.chosen, self.refuse, self.turns = {}, [0, 2], None, ()
 
-    def classify(self, observation, classifier, config):
-        self.given['classify'] = observation, classifier
+    def install(self, monkeypatch):
+        """Stand in for the stages of every Parser with the joint method."""
+        monkeypatch.setattr(Parser, 'classify', lambda _, observation: self.classify(observation))
+        monkeypatch.setattr(JointMethod, 'propose', lambda _, *args: self.propose(*args))
+        monkeypatch.setattr(JointMethod, 'parse', lambda *args: self.parse(*args))
+
+    def classify(self, observation):
+        self.given['classify'] = observation,
         self.refuse_in('classify')
         return self.p
 
-    def propose(self, observation, probabilities, models, config, rng):
-        self.given['propose'] = observation, probabilities, models, rng.random()
+    def propose(self, frame, seed):
+        self.given['propose'] = frame.observation, frame.probabilities, frame.models, seed
         self.refuse_in('propose')
         pool = self.candidates
         return type(pool)(pool.category, pool.translation * 1.0000001, pool.rotation_xyzw,
                           pool.size, pool.score)
 
-    def parse(self, observation, probabilities, pool, models, config, rng, max_instances=0,
-              more=None, verifier=None):
-        self.asked = [more(pool.take(self.chosen), turn) for turn in self.turns]
-        self.given['parse'] = observation, probabilities, pool, rng.random(), max_instances
+    def parse(self, method, frame, pool, seed, max_instances=0):
+        self.asked = [method.propose_more(frame, pool.take(self.chosen), turn, seed)
+                      for turn in self.turns]
+        self.given['parse'] = frame.observation, frame.probabilities, pool, seed, max_instances
         self.refuse_in('parse')
         n = len(self.chosen)
         return ParsedScene(pool.take(self.chosen), Energy(0.5, 0.25, 0.125),
@@ -168,9 +176,7 @@ def make_chain(bench, folder, monkeypatch):
     def make(names=('overhead',), parameters=None, active=range(4)):
         cameras = {name: replace(overhead_camera(), name=name) for name in names}
         stages = Stages(made_up_scene(folder.models, tuple(cameras.values())))
-        monkeypatch.setattr(classification_node, 'classify', stages.classify)
-        monkeypatch.setattr(candidate_node, 'propose', stages.propose)
-        monkeypatch.setattr(parsing_node, 'parse', stages.parse)
+        stages.install(monkeypatch)
         common = {'model': str(folder.path), 'cameras': list(names), 'seed': 5, 'warm_up': False}
         bench.chain = [bench.add(kind, **common, **(parameters or {}).get(i, {}))
                        for i, kind in enumerate(kinds)]

@@ -94,7 +94,7 @@ def test_a_camera_drops_out_and_returns(bench):
                == 'no_messages', sets=200)
     # Its driver is started again.
     assert run(bench, clock, raw, lambda: not blind(heard['b'][-1]))
-    assert node.sets.lost == {}
+    assert node.work.assembly.sets.lost == {}
 
 
 def test_a_camera_that_was_never_there_does_not_stop_the_others(bench):
@@ -226,7 +226,8 @@ def test_stamps_of_a_looped_bag_and_of_zero(bench):
                 camera.send(0)
             bench.rest(0.05)
         assert bench.spin(lambda: len(heard['a']) == 3 * (i + 1)), (i, heard['a'])
-    assert node.sets.drops['a', 'no_stamp'] == 9 and node.sets.drops['a', 'time_jump'] == 2
+    drops = node.work.assembly.sets.drops
+    assert drops['a', 'no_stamp'] == 9 and drops['a', 'time_jump'] == 2
 
 
 def test_drivers_that_stamp_calibrations_differently_lose_one_frame(bench):
@@ -333,9 +334,9 @@ def test_cameras_that_return_bring_no_old_frames(bench):
     standing(bench, raw)
     clock = Clock()
     run(bench, clock, raw, sets=6)
-    assert run(bench, clock, raw[:1], lambda: 'b' in node.sets.lost)
-    assert run(bench, clock, raw, lambda: 'b' not in node.sets.lost)
-    assert len(node.frames['b']._fusion) <= 2
+    assert run(bench, clock, raw[:1], lambda: 'b' in node.work.assembly.sets.lost)
+    assert run(bench, clock, raw, lambda: 'b' not in node.work.assembly.sets.lost)
+    assert len(node.work.assembly.frames['b']._fusion) <= 2
 
 
 def test_infos_are_not_needed_with_every_image(bench):
@@ -346,4 +347,4 @@ def test_infos_are_not_needed_with_every_image(bench):
         raw.send((i + 1) * S, info=False)
         bench.rest(0.05)
     assert bench.spin(lambda: len(heard['a']) >= 3)
-    assert isinstance(node.inputs[0]._last_info, CameraInfo)
+    assert isinstance(node.work.inputs[0]._last_info, CameraInfo)

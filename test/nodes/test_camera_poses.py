@@ -26,7 +26,7 @@ S = 10 ** 9
 
 def height(bench, node, name='a'):
     """Return z of the pose in use of a camera, m; None before its first frame."""
-    camera = node.frames[name].camera
+    camera = node.work.assembly.frames[name].camera
     return camera and round(float(camera.T_world_camera[2, 3]), 6)
 
 
@@ -152,7 +152,7 @@ def test_an_image_waits_for_its_pose_until_the_next_comes(bench, tf):
     say('a_optical', 2 * S, 1.2)
     raw.send(3 * S)
     assert bench.spin(lambda: len(heard['a']) == 1)
-    assert height(bench, node) == 1.2 and 'a' not in node.sets.drops
+    assert height(bench, node) == 1.2 and 'a' not in node.work.assembly.sets.drops
     # One whose pose has not even come by then is dropped, and counted.
     raw.send(4 * S)
     assert bench.spin(lambda: bench.reasons(node).get('a', ' ')[0] == 'late_extrinsics')
@@ -178,7 +178,7 @@ def test_poses_of_before_a_short_loop_are_forgotten(bench, tf):
     raw.send(103 * S)
     assert bench.spin(lambda: len(heard['a']) == 1)
     raw.send(101 * S)
-    assert bench.spin(lambda: node.sets.drops['a', 'time_jump'])
+    assert bench.spin(lambda: node.work.assembly.sets.drops['a', 'time_jump'])
     assert tf[0][0].moving['a_optical'] == {}
 
 

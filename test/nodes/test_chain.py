@@ -10,7 +10,7 @@ to the last bit; and what the last stage answers comes out as promised.
 from dataclasses import replace
 import json
 
-from hooc_perception.core.hypotheses.propose import propose_more
+from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import DepthView
@@ -20,9 +20,9 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.core.geometry import stage_rng
 from hooc_perception.nodes import parsing_node
 from hooc_perception.nodes.warm_up import overhead_camera
+from hooc_perception.parser import Parser
 from hooc_perception.ros.messages import conversions as c
 from hooc_perception.ros.messages.point_clouds import cloud_rows
 from hooc_perception.ros.messages.stages import candidates_from_messages
@@ -73,10 +73,10 @@ def test_stages_get_what_the_one_process_chain_gives_them(chain, folder):
         same_bits(stages.given[stage][0], expected)
     same_bits(stages.given['propose'][1], stages.p)
     same_bits(stages.given['parse'][1], stages.p)
-    pool = stages.propose(expected, stages.p, folder.models, None, stage_rng(SEED, 'propose'))
+    pool = stages.propose(Frame(expected, stages.p, folder.models), SEED)
     same_bits(stages.given['parse'][2], pool)
-    assert stages.given['propose'][3] == stage_rng(SEED, 'propose').random()
-    assert stages.given['parse'][3:] == (stage_rng(SEED, 'parse').random(), 1)
+    assert stages.given['propose'][3] == SEED
+    assert stages.given['parse'][3:] == (SEED, 1)
 
 
 def test_parsing_proposes_again_as_the_one_process_chain_does(bench, make_chain, folder):
@@ -87,10 +87,10 @@ def test_parsing_proposes_again_as_the_one_process_chain_does(bench, make_chain,
     send()
     assert bench.spin(lambda: 'parse' in stages.given, 60.0)
     observation, probabilities, pool = stages.given['parse'][:3]
-    chosen, config = pool.take(stages.chosen), bench.chain[3].parameters['propose']
-    assert config.round_samples == 300
-    expected = [propose_more(observation, probabilities, folder.models, chosen, config,
-                             stage_rng(SEED, 'propose', turn)) for turn in stages.turns]
+    alone = Parser.load(folder, parameters=own)
+    expected = [alone.method.propose_more(alone.frame(observation, probabilities),
+                                          pool.take(stages.chosen), turn, SEED)
+                for turn in stages.turns]
     same_bits(stages.asked, expected)
     assert any(len(more) for more in expected), 'the ball was left out'
 
@@ -310,9 +310,11 @@ def test_the_model_and_the_stage_have_a_status_before_the_first_frame(chain):
 def test_profile_and_overrides_give_the_stage_parameters(bench, folder):
     from hooc_perception.core.profiles import profile
     for name in ('paper', 'best', 'fast'):
-        node = bench.add(parsing_node.ParsingNode, profile=name, observe__max_depth_m=2.5)
+        changed = {'draws' if name == 'paper' else 'round_samples': 300}
+        node = bench.add(parsing_node.ParsingNode, profile=name,
+                         **{f'propose.{key}': value for key, value in changed.items()})
         assert node.parameters['parse'] == profile(name).parse
-        assert node.parameters['observe'].max_depth_m == 2.5
+        assert node.parameters['propose'] == replace(profile(name).propose, **changed)
     # Without the parameter, the model's own.
     node = bench.add(parsing_node.ParsingNode, model=str(folder.path))
     assert node.parameters['parse'] == profile('fast').parse

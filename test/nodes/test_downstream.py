@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 from hooc_perception.ros.health import downstream
-from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.qos import qos
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.node import Node  # noqa: E402
@@ -23,7 +23,7 @@ class Speaker(StageNode):
     """A stage that publishes what two others work on, and what nobody does."""
 
     def __init__(self, **kwargs):
-        super().__init__('classification_node', StageConfig(), **kwargs)
+        super().__init__('classification_node', **kwargs)
 
     def configure(self):
         self.publisher(PointCloud2, TOPIC)

@@ -124,7 +124,7 @@ def test_next_set_waits_for_the_answer(bench):
     assert bench.spin(lambda: len(heard['a']) == 2)
     # The newest, not the next in line.
     assert c.nanoseconds(heard['a'][1].header.stamp) == 3 * 10**8 + 1
-    assert node.sets.drops['a', 'superseded'] == 2
+    assert node.work.assembly.sets.drops['a', 'superseded'] == 2
 
 
 def test_a_refused_set_is_not_waited_for(bench):

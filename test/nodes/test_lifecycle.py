@@ -24,7 +24,7 @@ from hooc_perception.nodes import (
 )
 from hooc_perception.nodes.warm_up import overhead_camera
 from hooc_perception.ros.lifecycle.misaddressed import misaddressed
-from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.supervisor.params_file import unreached_sections
 from lifecycle_msgs.msg import Transition  # noqa: E402
 from lifecycle_msgs.srv import ChangeState, GetState  # noqa: E402
@@ -56,17 +56,17 @@ def test_cleaning_up_forgets_everything_that_was_built(bench, folder, module, ki
     endpoints = len(list(node.publishers)), len(list(node.subscriptions)), len(list(node.timers))
     for _ in range(2):
         assert node.trigger_configure() == SUCCESS, bench.reasons(node)
-        model = getattr(node, 'models', None)
+        models = getattr(node.work, 'models', None)
         kept = [weakref.ref(x) for x in (
-            getattr(node, 'sets', None), getattr(node, 'output', None),
-            getattr(node, 'input', None), model[0] if model else None) if x is not None]
-        assert kept
-        del model
+            node.work, getattr(node.work, 'assembly', None), getattr(node.work, 'output', None),
+            getattr(node.work, 'input', None), models[0] if models else None) if x is not None]
+        assert len(kept) > 1
+        del models
         assert node.trigger_activate() == SUCCESS and node.trigger_deactivate() == SUCCESS
         assert node.trigger_cleanup() == SUCCESS
         gc.collect()
         assert [ref() for ref in kept] == [None] * len(kept)
-        assert {n for n in set(vars(node)) - before if not n.startswith('_')} <= {'since'}
+        assert {n for n in set(vars(node)) - before if not n.startswith('_')} == set()
         assert endpoints == (len(list(node.publishers)), len(list(node.subscriptions)),
                              len(list(node.timers)))
 
@@ -92,10 +92,10 @@ def test_memory_comes_back_to_the_system(bench):
 
     class Large(StageNode):
         def __init__(self, **kwargs):
-            super().__init__('large', StageConfig(), **kwargs)
+            super().__init__('large', **kwargs)
 
         def configure(self):
-            self.much = [np.ones(10_000) for _ in range(2500)]      # 200 MB in small pieces
+            return [np.ones(10_000) for _ in range(2500)]       # 200 MB in small pieces
 
     node, process = bench.add(Large), psutil.Process()
     before = process.memory_info().rss
@@ -113,7 +113,7 @@ def test_a_model_for_another_number_of_cameras_is_refused_at_once(bench, folder)
 
 
 def test_a_stage_without_its_inputs_says_which_node_is_missing(bench, folder, monkeypatch):
-    monkeypatch.setattr('hooc_perception.ros.inputs.view_topics.EXPLAIN_AFTER_S', 0.3)
+    monkeypatch.setattr('hooc_perception.ros.inputs.view_input.EXPLAIN_AFTER_S', 0.3)
     node = bench.add(candidate_node.CandidateNode, model=str(folder.path), warm_up=False)
     node.trigger_configure(), node.trigger_activate()
     assert bench.spin(lambda: 'input' in bench.reasons(node))
@@ -125,7 +125,7 @@ def test_a_stage_without_its_inputs_says_which_node_is_missing(bench, folder, mo
 def test_an_error_nobody_thought_of_costs_one_message(bench):
     class Fragile(StageNode):
         def __init__(self, **kwargs):
-            super().__init__('fragile', StageConfig(), **kwargs)
+            super().__init__('fragile', **kwargs)
 
         def configure(self):
             self.heard = []

@@ -5,7 +5,9 @@
 from dataclasses import fields
 import importlib
 import re
+import tomllib
 
+from hooc_perception.chain import node_class
 import pytest
 import yaml
 
@@ -18,10 +20,7 @@ NODES = ('ingestion_node', 'classification_node', 'candidate_node', 'parsing_nod
 def own_config(name):
     """Return the Config class of a node's own parameters."""
     module = importlib.import_module(f'hooc_perception.nodes.{name}')
-    own = [value for key, value in vars(module).items()
-           if key.endswith('Config') and getattr(value, '__module__', '') == module.__name__]
-    return own[0] if own else importlib.import_module(
-        'hooc_perception.ros.lifecycle.stage_node').StageConfig
+    return getattr(module, node_class(name)).CONFIG
 
 
 @pytest.mark.parametrize('name', ['perception', 'replay'])
@@ -61,7 +60,7 @@ def test_every_topic_is_documented(repository):
 
 
 def test_every_node_is_an_executable(repository):
-    setup = (repository / 'setup.py').read_text()
+    scripts = tomllib.loads((repository / 'pyproject.toml').read_text())['project']['scripts']
     for node in NODES:
-        assert f"'{node}'" in setup
+        assert scripts[node] == f'hooc_perception.nodes.{node}:main'
         assert callable(importlib.import_module(f'hooc_perception.nodes.{node}').main)

@@ -9,7 +9,7 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from hooc_perception.nodes.replay_node import ReplayNode
-from hooc_perception.ros.inputs import view_topics
+from hooc_perception.ros.inputs import view_input
 from hooc_perception.ros.messages.conversions import header
 from hooc_perception.ros.qos import qos
 from std_msgs.msg import Header  # noqa: E402
@@ -40,7 +40,7 @@ def test_after_a_refusal_the_next_set_is_parsed(bench, make_chain, stage, error,
 
 
 def test_an_inactive_node_is_named_and_the_chain_goes_on_with_it(bench, make_chain, monkeypatch):
-    monkeypatch.setattr(view_topics, 'EXPLAIN_AFTER_S', 0.1)
+    monkeypatch.setattr(view_input, 'EXPLAIN_AFTER_S', 0.1)
     stages, send = make_chain(parameters=LONG, active=(0, 1, 3))
     candidate, parsing = bench.chain[2:]
     assert bench.reasons(candidate)['node'][0] == 'not_active'
@@ -58,7 +58,7 @@ def test_an_inactive_node_is_named_and_the_chain_goes_on_with_it(bench, make_cha
 
 
 def test_a_node_that_computes_is_not_taken_for_inactive(bench, make_chain, monkeypatch):
-    monkeypatch.setattr(view_topics, 'EXPLAIN_AFTER_S', 0.1)
+    monkeypatch.setattr(view_input, 'EXPLAIN_AFTER_S', 0.1)
     stages, send = make_chain(parameters=LONG)
     bench.executor.remove_node(bench.chain[2])
     send()
@@ -87,11 +87,11 @@ def test_a_replay_that_waits_goes_on(bench, repository):
     refusals = bench.peer.create_publisher(Header, 'views/refused', qos('views/refused'))
     node.trigger_configure()
     node.trigger_activate()
-    assert bench.spin(lambda: refusals.get_subscription_count() and node.player
-                      and node.player.waits_for_release)
-    refused = node.player.set_stamp_ns
+    assert bench.spin(lambda: refusals.get_subscription_count() and node.work.player
+                      and node.work.player.waits_for_release)
+    refused = node.work.player.set_stamp_ns
     refusals.publish(header(refused - 1, 'table'))      # of an older set
     bench.rest(0.3)
-    assert node.player.waits_for_release
+    assert node.work.player.waits_for_release
     refusals.publish(header(refused, 'table'))
-    assert bench.spin(lambda: node.player.set_stamp_ns > refused)
+    assert bench.spin(lambda: node.work.player.set_stamp_ns > refused)

@@ -33,7 +33,7 @@ def test_each_activation_plays_the_bag_with_the_same_timer(bench, repository):
         assert node.trigger_deactivate() == SUCCESS
         assert len(list(node.timers)) == timers
         # Inactive, it does nothing: the player has played all and is not asked again.
-        assert node.timer.is_canceled()
+        assert node.work._timer.is_canceled()
 
 
 def test_a_camera_without_images_is_named(bench, repository, monkeypatch):

@@ -7,7 +7,6 @@ import gc
 import importlib.util
 from pathlib import Path
 
-from hooc_perception.core.segment.observe import observe
 from hooc_perception.errors import HoocError
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from hooc_perception.nodes.ingestion_node import IngestionNode
-from hooc_perception.ros.inputs import view_topics
 from hooc_perception.ros.messages import conversions as c
 from hooc_perception.ros.qos import qos
 from hooc_perception.supervisor import environment
@@ -41,9 +39,10 @@ def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
     assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
     clock, sent, memory, objects = [10 ** 18], [], [], []
     node.now_ns = lambda: clock[0]
-    publish = node.output.publish
-    node.output.publish = lambda stamp, *rest: (sent.append(stamp), publish(stamp, *rest))
-    inputs = {camera.name: camera for camera in node.inputs}
+    publish = node.work.output.publish
+    node.work.output.publish = lambda head, *rest: (
+        sent.append(c.nanoseconds(head.stamp)), publish(head, *rest))
+    inputs = {camera.name: camera for camera in node.work.inputs}
     images = [raw_camera.a_depth(i) for i in range(4)]
     pose = c.transform_message([0.1, 0.2, 1.0], raw_camera.ROTATION, c.header(0, 'table'), 'x')
     infos = {name: raw_camera.a_camera(name) for name in names}
@@ -63,23 +62,24 @@ def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
             inputs[name]._on_info(c.camera_info_message(infos[name], head))
             inputs[name]._on_image(c.image_message(images[i % 4], '16UC1', head))
             given += 1
-        node.on_timer()
+        node.work._on_timer()
         if sent:
-            node.on_answer(PoseArray(header=c.header(sent[-1], 'table')))
+            node.work.pace._on_answer(PoseArray(header=c.header(sent[-1], 'table')))
         if i % 500 == 499:
             looped += 1
             gc.collect()
             memory.append(psutil.Process().memory_info().rss)
             objects.append(len(gc.get_objects()))
         bench.executor.spin_once(timeout_sec=0)
-    waiting = len(names) - len(node.sets.missing())
-    jumps = sum(n for (_, reason), n in node.sets.drops.items() if reason == 'time_jump')
-    accounted = node.sets.used.total() + node.sets.drops.total() + waiting
+    sets = node.work.assembly.sets
+    waiting = len(names) - len(sets.missing())
+    jumps = sum(n for (_, reason), n in sets.drops.items() if reason == 'time_jump')
+    accounted = sets.used.total() + sets.drops.total() + waiting
     # A jump counts even where nothing waited.
-    assert given <= accounted <= given + jumps, (given, node.sets.used, node.sets.drops)
+    assert given <= accounted <= given + jumps, (given, sets.used, sets.drops)
     assert all(reason in ('superseded', 'spread', 'time_jump')
-               for _, reason in node.sets.drops), node.sets.drops
-    assert looped == 4 and jumps >= 3 and len(sent) > 0.85 * SETS and len(sent) == node.number
+               for _, reason in sets.drops), sets.drops
+    assert looped == 4 and jumps >= 3 and len(sent) > 0.85 * SETS and len(sent) == node.work.number
     assert memory[-1] - memory[1] < 8e6, memory
     assert objects[-1] - objects[1] < 2000, objects
 
@@ -98,9 +98,7 @@ def test_hundreds_of_sets_with_drop_outs_and_refusals_through_the_chain(bench, m
     stages, send = make_chain(names, {
         0: {'wait_for_answer_s': 600.0, 'camera_timeout_s': 0.3, 'max_frame_age_s': 0.0,
             'explain_after_s': 0.0}, 3: {'sigmas': False}})
-    seen = observe(stages.views)
-    monkeypatch.setattr(view_topics, 'observe', lambda views, config: seen)
-    ingestion = bench.chain[0]
+    ingestion = bench.chain[0].work
     clock, away, given, refused = [10 ** 18], dict.fromkeys(names, 0), 0, Counter()
     for node in bench.chain:
         node.now_ns = lambda: clock[0]
@@ -111,9 +109,9 @@ def test_hundreds_of_sets_with_drop_outs_and_refusals_through_the_chain(bench, m
     bench.peer.create_subscription(PoseArray, 'objects/poses', count, qos('objects/poses'))
 
     def settled():
-        sets = ingestion.sets
+        sets = ingestion.assembly.sets
         heard = sets.used.total() + sets.drops.total() + len(names) - len(sets.missing())
-        return heard == given and ingestion.sent is None
+        return heard == given and ingestion.pace.stamp_ns is None
     for i in range(STEPS):
         clock[0] += 100 * MS
         for name in names:

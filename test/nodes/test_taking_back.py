@@ -16,6 +16,7 @@ import trimesh
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.core.methods.joint import JointMethod
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import Energy, ParsedScene
 from hooc_perception.nodes import parsing_node
@@ -44,22 +45,22 @@ KINDS = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
 SPEAKER = """
 import sys
 from hooc_perception.ros.lifecycle.spin import run_node
-from hooc_perception.ros.lifecycle.stage_node import StageConfig, StageNode
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from std_msgs.msg import String
 
 class Speaker(StageNode):
     def __init__(self):
-        super().__init__('speaker', StageConfig())
+        super().__init__('speaker')
         self.trigger_configure(), self.trigger_activate()
 
     def configure(self):
-        self.words = self.publisher(String, 'scene/summary')
+        return self.publisher(String, 'scene/summary')
 
     def activate(self):
-        self.words.publish(String(data='here'))
+        self.work.publish(String(data='here'))
 
     def deactivate(self):
-        self.words.publish(String(data='gone'))
+        self.work.publish(String(data='gone'))
 
 sys.exit(run_node(Speaker))
 """
@@ -94,7 +95,7 @@ def parsing(bench, folder, monkeypatch):
     adapter, observation, some = Adapter(), observe(views), np.ones(2, np.float32)
     parsed = ParsedScene(pool.take([0, 1]), Energy(0.5, 0.25, 0.125), some, some, some,
                          np.full(2, 2, np.uint8), pool)
-    monkeypatch.setattr(parsing_node, 'parse', lambda *args: parsed)
+    monkeypatch.setattr(JointMethod, 'parse', lambda *args: parsed)
     monkeypatch.setattr(parsing_node, 'adapters_of', lambda node: [adapter])
     node = bench.add(parsing_node.ParsingNode, model=str(folder.path), warm_up=False,
                      sigmas=False)
@@ -106,7 +107,7 @@ def parsing(bench, folder, monkeypatch):
     heard = listen(bench)
 
     def look():
-        node.on_set(STAMP, observation, messages)
+        node.work.on_set(STAMP, observation, messages)
         assert bench.spin(lambda: all(heard.values())
                           and len(heard['objects/poses'][-1].poses) == 2)
     assert node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
@@ -219,7 +220,7 @@ def test_who_waits_for_detect_is_told_of_the_end(bench, parsing, end):
 
 def test_a_broken_adapter_costs_neither_the_answer_nor_the_others(bench, parsing):
     node, other = parsing.node, Adapter()
-    node.adapters.append(other)
+    node.work.adapters.append(other)
     parsing.adapter.broken = True
     for messages in parsing.heard.values():
         messages.clear()

@@ -7,7 +7,7 @@ Each check returns None, or one sentence that says what is wrong and how to fix 
 ingestion node reports it while running, `hooc doctor` for a bag.
 """
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import replace
 
 from hooc_perception.core.arrays import Float32Array, Float64Array
@@ -79,6 +79,14 @@ def skew_trouble(K: Float64Array) -> str | None:
             'check the order of its numbers or calibrate again')
 
 
+def rig_size_trouble(cameras: Sized, trained: Sized) -> str | None:
+    """Check that there are as many cameras as a view-bound model was trained for."""
+    if len(cameras) == len(trained):
+        return None
+    return (f'the model was trained for {len(trained)} cameras, but there are {len(cameras)}; '
+            'train again for this rig, or use the best profile')
+
+
 def rig_trouble(cameras: Sequence[Camera], trained: Sequence[Camera], shift_m: float = 0.1,
                 turn_deg: float = 10.0) -> str | None:
     """
@@ -87,9 +95,8 @@ def rig_trouble(cameras: Sequence[Camera], trained: Sequence[Camera], shift_m: f
     :param cameras, trained: in the same order.
     :param shift_m, turn_deg: largest difference of a pose that is accepted.
     """
-    if len(cameras) != len(trained):
-        return (f'the model was trained for {len(trained)} cameras, but there are '
-                f'{len(cameras)}; train again for this rig, or use the best profile')
+    if trouble := rig_size_trouble(cameras, trained):
+        return trouble
     for camera, known in zip(cameras, trained):
         T = np.linalg.inv(known.T_world_camera) @ camera.T_world_camera
         shift = float(np.linalg.norm(T[:3, 3]))

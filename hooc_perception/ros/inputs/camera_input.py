@@ -1,56 +1,83 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""One raw depth camera: pairs images with calibration, knows where the camera stands."""
+"""One raw depth camera: pairs its images with calibration and pose."""
 
 from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass
 import time
+from typing import Any, TypeVar
 
 from geometry_msgs.msg import TransformStamped
+from hooc_perception.core.config import param
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.health.silence import why_silent
-from hooc_perception.ros.inputs.camera_poses import PoseNotYet
+from hooc_perception.ros.inputs.camera_poses import PoseNotYet, PoseParameters, TfPoses
+from hooc_perception.ros.lifecycle.stage_config import StageConfig
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, nanoseconds, transform_message
 from hooc_perception.ros.qos import auto_reliability, overridable, qos
+from rclpy.subscription import Subscription
 from sensor_msgs.msg import CameraInfo, Image
+
+# Called with the camera's name and messages that belong together.
+FrameCallback = Callable[[str, Image, CameraInfo, TransformStamped], None]
+M = TypeVar('M', Image, CameraInfo)
+
+
+@dataclass(frozen=True)
+class CameraInputConfig(StageConfig):
+    """Parameters of a node that subscribes to raw cameras."""
+
+    image_reliability: str = param(
+        'auto', 'auto subscribes reliably only if every publisher offers it.',
+        choices=('auto', 'reliable', 'best_effort'))
 
 
 class CameraInput:
     """
-    Subscribe to one camera; call back with (image, info, transform) messages that agree.
+    Subscribe to one camera; call back with image, camera_info and pose that belong together.
 
-    :param node: a StageNode whose config has target_frame and image_reliability.
-    :param poses: mapping of the name to x y z qx qy qz qw (T_target_camera), or to () where
-        topics and tf say it; looked at for every image.
-    :param tf: TfPoses.
-    :param callback: called as callback(name, image, info, transform).
+    :ivar name: of the camera.
+    :ivar heard: monotonic seconds of the last image.
     """
 
-    def __init__(self, node, name, poses, tf, callback):
-        """Create the subscriptions; the executor serves them in the order of creation."""
+    def __init__(self, node: StageNode[CameraInputConfig, Any], name: str,
+                 poses: PoseParameters, tf: TfPoses, callback: FrameCallback) -> None:
+        """
+        Create the subscriptions; the executor serves them in the order of creation.
+
+        :param poses: the pose of a camera by parameter, which wins over topic and tf; looked up
+            for every image.
+        """
         self.name, self.node, self._tf, self._callback = name, node, tf, callback
-        self._poses, self._latched = poses, None
-        self._infos, self._images, self._last_info = OrderedDict(), OrderedDict(), None
-        self._late = None               # (image, info) whose pose tf does not have yet
-        self._unplaced = None           # (image, info) that came before all word of a pose
+        self.heard = time.monotonic()
+        self._poses = poses
+        self._latched: TransformStamped | None = None       # the last <camera>/extrinsics
+        self._infos: OrderedDict[int, CameraInfo] = OrderedDict()
+        self._images: OrderedDict[int, Image] = OrderedDict()
+        self._last_info: CameraInfo | None = None
+        # Images that wait: for a pose that tf does not have yet, and for any pose at all.
+        self._late: tuple[Image, CameraInfo] | None = None
+        self._unplaced: tuple[Image, CameraInfo] | None = None
         # The stamp of the last image whose own camera_info did not come, 0 = all did.
         self._unmatched = 0
-        self.heard = time.monotonic()   # when the last image came
         node.subscription(TransformStamped, '<camera>/extrinsics', self._on_extrinsics,
                           f'{name}/extrinsics')
-        self._reliable = None
-        self._subscriptions = []
+        self._reliable: bool | None = None
+        self._subscriptions: list[Subscription] = []
         node.owned(lambda _: self._unsubscribe(), None)
         self.adapt_reliability()
 
-    def begin(self):
+    def begin(self) -> None:
         """Begin to listen: what was heard before does not count."""
         self.heard, self._late, self._unplaced = time.monotonic(), None, None
         self._images.clear()
 
     # Reliability.
 
-    def adapt_reliability(self):
-        """Subscribe anew if what the publishers offer asks for another reliability."""
+    def adapt_reliability(self) -> None:
+        """Subscribe again if what the publishers offer demands another reliability."""
         wanted = {'reliable': True, 'best_effort': False}.get(self.node.config.image_reliability)
         if wanted is None:
             topics = [f'{self.name}/depth/image_raw', f'{self.name}/depth/camera_info']
@@ -69,18 +96,18 @@ class CameraInput:
                 qos(f'<camera>/depth/{suffix}', wanted),
                 qos_overriding_options=overridable(reliability=False)))
 
-    def _unsubscribe(self):
+    def _unsubscribe(self) -> None:
         while self._subscriptions:
             self.node.destroy_subscription(self._subscriptions.pop())
 
     # Messages.
 
-    def _on_extrinsics(self, message):
+    def _on_extrinsics(self, message: TransformStamped) -> None:
         self._latched = message
         if self._unplaced and self.node.active:
             self._hand_on(*self._unplaced)
 
-    def _on_info(self, message):
+    def _on_info(self, message: CameraInfo) -> None:
         self._last_info = message
         self._hold(self._infos, message)
         stamp = nanoseconds(message.header.stamp)
@@ -88,7 +115,7 @@ class CameraInput:
             self._unmatched = 0     # it was only late
         self._match(stamp)
 
-    def _on_image(self, message):
+    def _on_image(self, message: Image) -> None:
         self.heard = time.monotonic()
         if not self.node.active:
             return
@@ -98,7 +125,7 @@ class CameraInput:
             return
         if self._last_info is None:
             if len(self._images) > 1:
-                self.node.diagnostics.warn(self.name, *self.info_silence())
+                self._report(self.info_silence())
         elif self._unmatched or len(self._images) > 1:
             # A driver that does not stamp both alike: after one image without its own
             # camera_info, the latest one has to do.
@@ -107,7 +134,11 @@ class CameraInput:
             self._unmatched = stamp
             self._deliver(message, self._last_info)
 
-    def _match(self, stamp):
+    def _report(self, trouble: tuple[str, str] | None) -> None:
+        if trouble:
+            self.node.diagnostics.warn(self.name, *trouble)
+
+    def _match(self, stamp: int) -> bool:
         """Deliver the pair of a stamp if both are there; return whether they were."""
         if stamp not in self._images or stamp not in self._infos:
             return False
@@ -117,13 +148,13 @@ class CameraInput:
         self._deliver(image, info)
         return True
 
-    def silence(self):
-        """Return (code, sentence) on why nothing comes of this camera, as far as one can see."""
+    def silence(self) -> tuple[str, str]:
+        """Return (code, sentence) on why no images come, as far as the graph shows it."""
         topics = {s.topic_name.rpartition('/')[2]: s for s in self._subscriptions}
         return why_silent(self.node, topics['image_raw'])
 
-    def info_silence(self):
-        """Return (code, sentence) on why no camera_info comes, None where one has come."""
+    def info_silence(self) -> tuple[str, str] | None:
+        """Return (code, sentence) on why no camera_info comes, None if one has come."""
         if self._last_info is not None:
             return None
         topics = {s.topic_name.rpartition('/')[2]: s for s in self._subscriptions}
@@ -131,13 +162,13 @@ class CameraInput:
         return 'no_camera_info', f'depth images arrive but no camera_info: {sentence}'
 
     @staticmethod
-    def _hold(waiting, message, capacity=4):
+    def _hold(waiting: OrderedDict[int, M], message: M, capacity: int = 4) -> None:
         waiting[nanoseconds(message.header.stamp)] = message
         while len(waiting) > capacity:
             waiting.popitem(last=False)
 
-    def _deliver(self, image, info):
-        """Hand on an image, or with the next one where its pose comes later than itself."""
+    def _deliver(self, image: Image, info: CameraInfo) -> None:
+        """Hand on an image; if its pose is still to come, when the next image comes."""
         late, self._late = self._late, None
         trouble = late and self._hand_on(*late)
         if trouble:
@@ -146,8 +177,8 @@ class CameraInput:
         if self._hand_on(image, info):
             self._late = image, info
 
-    def _hand_on(self, image, info):
-        """Call back with an image; return the PoseNotYet where its pose is still to come."""
+    def _hand_on(self, image: Image, info: CameraInfo) -> PoseNotYet | None:
+        """Call back with an image; return the PoseNotYet if its pose is still to come."""
         self._unplaced = None
         try:
             transform = self._extrinsics(image)
@@ -155,13 +186,13 @@ class CameraInput:
             return error
         except HoocError as error:
             self.node.diagnostics.warn(self.name, 'no_extrinsics', str(error))
-            # Topics do not keep the order among each other: the latched pose may be under way.
+            # There is no order between topics: the latched pose may be under way.
             self._unplaced = (image, info) if self._latched is None else None
         else:
             self._callback(self.name, image, info, transform)
         return None
 
-    def _extrinsics(self, image):
+    def _extrinsics(self, image: Image) -> TransformStamped:
         """Return T_target_camera: from parameters, the latched topic or tf, in this order."""
         target, frame = self.node.config.target_frame, image.header.frame_id
         pose = self._poses[self.name]

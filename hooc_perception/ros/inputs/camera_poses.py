@@ -1,16 +1,30 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Where cameras stand, by parameters and by tf2."""
+"""Camera poses from parameters and from tf2."""
 
+from typing import Any
+
+from builtin_interfaces.msg import Time as Stamp
+from geometry_msgs.msg import TransformStamped
 from hooc_perception.errors import HoocError
+from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import is_rigid, nanoseconds
+import numpy as np
 from rcl_interfaces.msg import ParameterDescriptor, SetParametersResult
+from rclpy.node import Node
+from rclpy.parameter import Parameter
 from rclpy.time import Time
 
-try:    # Not on PyPI; there on a ROS installation.
-    from tf2_ros import Buffer, ExtrapolationException, TransformException, TransformListener
+try:
+    from tf2_ros import (  # pyright: ignore[reportMissingImports] - on ROS installations only
+        Buffer,
+        ExtrapolationException,
+        TransformException,
+        TransformListener,
+    )
 except ImportError:
-    Buffer = None
+    Buffer = TransformListener = None
+    ExtrapolationException = TransformException = LookupError
 
 
 class PoseNotYet(HoocError):
@@ -18,22 +32,23 @@ class PoseNotYet(HoocError):
 
 
 class TfPoses:
-    """Camera poses from /tf and /tf_static, where tf2 is installed; else always None."""
+    """Camera poses from /tf and /tf_static if tf2 is installed; else always None."""
 
-    def __init__(self, node):
+    def __init__(self, node: StageNode[Any, Any]) -> None:
         """Listen for a StageNode until it is cleaned up."""
-        self._buffer, self._asked = None, {}
-        if Buffer:
+        self._buffer: Any = None
+        self._asked: dict[str, int] = {}    # source frame -> last stamp in ns
+        if Buffer is not None and TransformListener is not None:
             self._buffer = Buffer()
             node.owned(TransformListener.unregister, TransformListener(self._buffer, node))
 
-    def lookup(self, target, source, stamp):
+    def lookup(self, target: str, source: str, stamp: Stamp) -> TransformStamped | None:
         """
-        Return the TransformStamped T_target_source at a stamp, or None where none is known.
+        Return the TransformStamped T_target_source at a stamp, or None if none is known.
 
-        What is static is so at every stamp; a camera on an arm was elsewhere a moment ago.
+        A static pose holds at every stamp; a camera on an arm was elsewhere a moment ago.
 
-        :raises PoseNotYet: where it is known at other stamps only.
+        :raises PoseNotYet: if it is known at other stamps only.
         """
         if self._buffer is None or not source:
             return None
@@ -43,7 +58,7 @@ class TfPoses:
             return self._buffer.lookup_transform(target, source, Time.from_msg(stamp))
         except ExtrapolationException:
             if stamp_ns < asked:
-                # Time was set back, and tf2 takes nothing in that is much older than what it has.
+                # Time was set back, and tf2 ignores transforms much older than its latest.
                 self.clear()
             raise PoseNotYet(f'/tf does not say where {source} was in {target} at the stamp of '
                              'its image, even when the next image came; synchronise the clocks, '
@@ -51,8 +66,8 @@ class TfPoses:
         except TransformException:
             return None
 
-    def clear(self):
-        """Forget all poses that are not static: time was set back."""
+    def clear(self) -> None:
+        """Forget all poses that are not static, because time was set back."""
         if self._buffer is not None:
             self._buffer.clear()
 
@@ -61,16 +76,16 @@ class PoseParameters:
     """
     The parameters `extrinsics.<camera>` of a node: seven numbers x y z qx qy qz qw, or none.
 
-    They may change while the node runs; what is no pose is refused.
+    They may change while the node runs; anything that is no pose is rejected.
     """
 
-    def __init__(self, node):
-        """Watch over those that are declared later."""
+    def __init__(self, node: Node) -> None:
+        """Check those that are declared later."""
         self._node = node
         node.add_on_set_parameters_callback(self._on_set)
 
-    def declare(self, name):
-        """Declare that of a camera; HoocError where it is set to what is no pose."""
+    def declare(self, name: str) -> None:
+        """Declare the parameter of a camera; HoocError if its value is no pose."""
         key = f'extrinsics.{name}'
         if not self._node.has_parameter(key):
             self._node.declare_parameter(key, [], ParameterDescriptor(
@@ -78,13 +93,13 @@ class PoseParameters:
                 'target frame: x y z qx qy qz qw; empty takes topics or tf. [m]'))
         _pose(key, self._node.get_parameter(key).value)
 
-    def __getitem__(self, name):
+    def __getitem__(self, name: str) -> tuple[float, ...]:
         """Return the pose of a camera as it is now, () for none."""
-        return tuple(self._node.get_parameter(f'extrinsics.{name}').value)
+        return tuple(self._node.get_parameter(f'extrinsics.{name}').value or ())
 
-    def _on_set(self, parameters):
+    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
         for parameter in parameters:
-            # Those that are still being declared are judged by `declare`.
+            # Those that are still being declared are checked by `declare`.
             if parameter.name.startswith('extrinsics.') and (
                     self._node.has_parameter(parameter.name)):
                 try:
@@ -94,7 +109,7 @@ class PoseParameters:
         return SetParametersResult(successful=True)
 
 
-def _pose(key, value):
+def _pose(key: str, value: Any) -> tuple[float, ...]:
     """Return the value of a parameter as a tuple of 0 or 7 floats; HoocError for no pose."""
     try:
         pose = tuple(float(x) for x in value)
@@ -102,7 +117,7 @@ def _pose(key, value):
         raise HoocError(f'parameter {key} is {value!r}; give x y z qx qy qz qw') from None
     if len(pose) not in (0, 7):
         raise HoocError(f'parameter {key} has {len(pose)} numbers; give x y z qx qy qz qw')
-    if pose and not is_rigid(pose[:3], pose[3:]):
+    if pose and not is_rigid(np.array(pose[:3]), np.array(pose[3:])):
         raise HoocError(f'parameter {key} is no pose; give x y z qx qy qz qw, finite and the '
                         'quaternion of norm 1')
     return pose

@@ -1,11 +1,14 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""One raw camera's messages -> a frame that the stages can use, or the reason why not."""
+"""The messages of one raw camera -> a usable frame, or the reason why there is none."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 import textwrap
+from typing import Any, TypeVar
 
 from geometry_msgs.msg import TransformStamped
+from hooc_perception.core.arrays import Float32Array, UInt8Array
 from hooc_perception.core.segment.checks import (
     pose_trouble,
     reading_trouble,
@@ -16,13 +19,16 @@ from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.depth_units import depth_unit_error
 from hooc_perception.ros.messages.conversions import camera_from_messages, depth_from_message
-import numpy as np
+from sensor_msgs.msg import CameraInfo, Image
+
+T = TypeVar('T')
 
 
 class FrameRefused(HoocError):
     """A frame that cannot be used; `code` is the reason in short."""
 
-    def __init__(self, code, sentence):
+    def __init__(self, code: str, sentence: str) -> None:
+        """Keep the code beside the sentence."""
         super().__init__(sentence)
         self.code = code
 
@@ -38,23 +44,27 @@ class RawFrame:
     """
 
     camera: Camera
-    depth: np.ndarray
+    depth: Float32Array
     frame_id: str
 
 
 class RawFrames:
     """
-    Decode the frames of one camera, refuse what cannot be meant, remember the last few.
+    Decode the frames of one camera, reject implausible ones, remember the last few.
 
     :ivar camera: the Camera of the last good frame, None before.
     """
 
-    def __init__(self, name):
-        self.name, self.camera = name, None
-        self._key = self._known = None
+    def __init__(self, name: str) -> None:
+        """Begin without any frame of the camera of that name."""
+        self.name = name
+        self.camera: Camera | None = None
+        # The last Camera, and the content of the messages that it was built from.
+        self._known: tuple[tuple[Any, ...], Camera] | None = None
         self._fusion = Fusion()
 
-    def decode(self, image, info, transform, max_depth_m):
+    def decode(self, image: Image, info: CameraInfo, transform: TransformStamped,
+               max_depth_m: float) -> RawFrame:
         """
         Return the RawFrame of three messages.
 
@@ -75,7 +85,7 @@ class RawFrames:
         self.camera = camera
         return RawFrame(camera, depth, image.header.frame_id)
 
-    def remember(self, depth, frames):
+    def remember(self, depth: Float32Array, frames: int) -> None:
         """
         Keep an image for fusion.
 
@@ -86,40 +96,44 @@ class RawFrames:
         else:
             self.forget()
 
-    def forget(self):
-        """Forget what was kept for fusion."""
+    def forget(self) -> None:
+        """Forget the images that were kept for fusion."""
         self._fusion.forget()
 
-    def view(self, frame):
-        """Return the DepthView of a RawFrame, fused with what is remembered, and the counts."""
+    def view(self, frame: RawFrame) -> tuple[DepthView, UInt8Array | None]:
+        """
+        Return a frame as DepthView, fused with the remembered ones.
+
+        :return: (view; (H, W) number of readings per pixel, None if nothing was fused).
+        """
         if len(self._fusion) < 2:
             return DepthView(frame.camera, frame.depth), None
         depth, count = self._fusion.fused()
         return DepthView(frame.camera, depth), count
 
-    def _camera(self, info, transform):
+    def _camera(self, info: CameraInfo, transform: TransformStamped) -> Camera:
         """Return the Camera of two messages; the same object while they say the same."""
         key = (info.width, info.height, info.k.tobytes(), tuple(info.d), info.distortion_model,
                str(transform.transform))
-        if key == self._key:
-            return self._known
+        if self._known and key == self._known[0]:
+            return self._known[1]
         unmoved = TransformStamped()
         _refusing('bad_calibration', camera_from_messages, self.name, info, unmoved)
         camera = _refusing('bad_extrinsics', camera_from_messages, self.name, info, transform)
         _refuse('absurd_extrinsics', pose_trouble(camera), f'camera {self.name}: ')
-        self._key, self._known = key, camera
+        self._known = key, camera
         return camera
 
 
-def _refusing(code, function, *args):
-    """Return function(*args); a HoocError becomes a FrameRefused, of bearable length."""
+def _refusing(code: str, function: Callable[..., T], *args: Any) -> T:
+    """Return function(*args); a HoocError becomes a FrameRefused of limited length."""
     try:
         return function(*args)
     except HoocError as error:
         raise FrameRefused(code, textwrap.shorten(str(error), 500, placeholder=' ...')) from error
 
 
-def _refuse(code, trouble, before=''):
-    """Raise FrameRefused where there is trouble."""
+def _refuse(code: str, trouble: str | None, before: str = '') -> None:
+    """Raise FrameRefused if there is trouble."""
     if trouble:
         raise FrameRefused(code, before + trouble)

@@ -3,28 +3,35 @@
 """The join of what stages publish for one stamp."""
 
 from collections import Counter, OrderedDict
+from collections.abc import Iterable
+from typing import Any
 
 
 class StampJoin:
     """
     Bring together the parts that several topics carry for one stamp.
 
-    :param parts: names of all parts of a whole.
-    :param capacity: how many stamps may wait; the oldest makes room.
+    :ivar drops: how often each (missing part, reason) was the end of a stamp.
     """
 
-    def __init__(self, parts, capacity=16):
-        self.parts, self.capacity = frozenset(parts), capacity
-        self.drops = Counter()          # (missing part, reason) -> number
-        self._waiting = OrderedDict()   # stamp_ns -> {part: value}
+    def __init__(self, parts: Iterable[str], capacity: int = 16) -> None:
+        """
+        Begin without any part.
 
-    def add(self, part, stamp_ns, value):
+        :param parts: names of all parts of a whole.
+        :param capacity: how many stamps may wait; the oldest makes room.
+        """
+        self.parts, self.capacity = frozenset(parts), capacity
+        self.drops: Counter[tuple[str, str]] = Counter()
+        self._waiting: OrderedDict[int, dict[str, Any]] = OrderedDict()
+
+    def add(self, part: str, stamp_ns: int, value: Any) -> dict[str, Any] | None:
         """
         Take in one part; return {part: value} once the stamp is whole, else None.
 
         When a stamp is whole, earlier arrivals that still wait can only be older news and are
         dropped as `incomplete`, under the name of a part that they lack; so is the first to
-        arrive where more than `capacity` wait.
+        arrive if more than `capacity` wait.
         """
         have = self._waiting.setdefault(stamp_ns, {})
         have[part] = value
@@ -38,10 +45,10 @@ class StampJoin:
             self._drop(next(iter(self._waiting)))
         return None
 
-    def clear(self):
+    def clear(self) -> None:
         """Forget everything that waits."""
         self._waiting.clear()
 
-    def _drop(self, stamp):
+    def _drop(self, stamp: int) -> None:
         have = self._waiting.pop(stamp)
         self.drops[min(self.parts - have.keys()), 'incomplete'] += 1

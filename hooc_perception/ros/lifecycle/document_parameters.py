@@ -6,22 +6,26 @@ Write the parameter tables of docs/nodes.md from the declarations.
     python -m hooc_perception.ros.lifecycle.document_parameters docs/nodes.md
 
 A table stands between `<!-- parameters: NAME -->` and `<!-- end -->`, where NAME is a class of
-parameters, `module:Class`. Profiles that give a stage another default have a column each.
+parameters, `module:Class`. Profiles that give a stage other defaults have one column each.
 """
 
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 import importlib
 import re
 import sys
+from typing import Any
 
 from hooc_perception.chain import PROFILES
-from hooc_perception.ros.lifecycle.stage_node import StageConfig
+from hooc_perception.core.config import Config
+from hooc_perception.ros.lifecycle.stage_config import StageConfig
 
 _BLOCK = re.compile(r'(<!-- parameters: (\S+?):(\w+)(?: as (\w+))? -->\n).*?(<!-- end -->)',
                     re.DOTALL)
 
 
-def table(config, section='', profiles=None):
+def table(config: Config, section: str = '',
+          profiles: Mapping[str, Config] | None = None) -> str:
     """
     Return the Markdown table of a Config's fields.
 
@@ -37,7 +41,7 @@ def table(config, section='', profiles=None):
         declared |= other.parameters()
     for f in declared.values():
         if f.name in common and not section:
-            continue    # listed once for all nodes
+            continue    # listed once, for all nodes
         m = f.metadata
         name = f'{section}.{f.name}' if section else f.name
         # A method that has no such parameter rejects it.
@@ -48,9 +52,9 @@ def table(config, section='', profiles=None):
     return '\n'.join(lines) + '\n'
 
 
-def documented(text):
-    """Return a Markdown text with every table of parameters written anew."""
-    def fill(match):
+def documented(text: str) -> str:
+    """Return a Markdown text with every table of parameters rewritten."""
+    def fill(match: re.Match[str]) -> str:
         start, module, name, stage, end = match.groups()
         config = getattr(importlib.import_module(module), name)()
         profiles = None
@@ -61,7 +65,7 @@ def documented(text):
     return _BLOCK.sub(fill, text)
 
 
-def _value(value):
+def _value(value: Any) -> str:
     if isinstance(value, tuple):
         return '`[' + ', '.join(map(str, value)) + ']`'
     if isinstance(value, str):
@@ -69,11 +73,11 @@ def _value(value):
     return str(value).lower() if isinstance(value, bool) else _number(value)
 
 
-def _number(value):
+def _number(value: float) -> str:
     return str(value) if isinstance(value, int) else f'{value:g}'
 
 
-def _range(m):
+def _range(m: Mapping[str, Any]) -> str:
     if m['choices']:
         return ', '.join(f'`{choice}`' if choice else 'empty' for choice in m['choices'])
     if m['low'] is None and m['high'] is None:
@@ -82,7 +86,7 @@ def _range(m):
     return f'{low} .. {high} {m["unit"]}'.strip()
 
 
-def main(paths):
+def main(paths: Iterable[str]) -> int:
     """Rewrite the tables of files; return the exit code."""
     for path in paths:
         with open(path, encoding='utf-8') as file:

@@ -1,14 +1,14 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Memory of what a node has forgotten, back to the system."""
+"""Return the memory of what a node has forgotten to the operating system."""
 
 import ctypes
 import gc
 import sys
 
 
-def give_back_memory():
-    """Free what nobody refers to, and have the C library give it back to the system."""
+def give_back_memory() -> None:
+    """Free unreferenced objects and have the C library return their memory to the system."""
     gc.collect()
     if sys.platform == 'linux':
         try:

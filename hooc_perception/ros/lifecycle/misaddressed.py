@@ -1,24 +1,24 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Parameters that a file or a command line sets and nobody takes: typing errors, mostly."""
+"""Parameters that a file or a command line sets and no node has: typing errors, mostly."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import fields
 import difflib
 import importlib
 
-from hooc_perception.chain import NODES, PROFILES, STAGES
+from hooc_perception.chain import node_class, NODES, PROFILES, STAGES
 from hooc_perception.core.config import Config
 from hooc_perception.core.profiles import profile
 
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 
-def misaddressed(given, declared):
+def misaddressed(given: Iterable[str], declared: Iterable[str]) -> list[str]:
     """
-    Return one sentence for each parameter that was given and is not known to any node.
+    Return one sentence for each parameter that was given and that no node knows.
 
-    What another node knows may come from a section for all nodes and is passed over.
+    Parameters of other nodes may come from a section for all nodes and are passed over.
 
     :param given: names that files and the command line set for a node.
     :param declared: names that the node has declared.
@@ -32,7 +32,7 @@ def misaddressed(given, declared):
 
 def inert(given: Iterable[str], stages: Mapping[str, Config]) -> list[str]:
     """
-    Return one sentence for each given parameter that only another profile's method has.
+    Return one sentence for each given parameter that only the method of another profile has.
 
     :param given: names that files and the command line set for a node.
     :param stages: {stage: Config} that the node has declared.
@@ -48,22 +48,20 @@ def inert(given: Iterable[str], stages: Mapping[str, Config]) -> list[str]:
     return wrong
 
 
-def known_elsewhere():
+def known_elsewhere() -> set[str]:
     """Return the names of all parameters of all nodes, extrinsics and QoS aside."""
-    names = set()
+    names: set[str] = set()
     for node in NODES:
-        # By name, for this layer lies below the nodes; and only where something is wrong.
+        # By name, for this layer lies below the nodes; and only if something is wrong.
         module = importlib.import_module(f'hooc_perception.nodes.{node}')
-        for config in vars(module).values():
-            if isinstance(config, type) and config.__name__.endswith('Config'):
-                names |= {f.name for f in fields(config)}
+        names |= {f.name for f in fields(getattr(module, node_class(node)).CONFIG)}
     for name in PROFILES:
         for stage in STAGES:
             names |= {f'{stage}.{p}' for p in profile(name).stage(stage).parameters()}
     return names
 
 
-def _sentence(name, known, declared):
+def _sentence(name: str, known: Collection[str], declared: Iterable[str]) -> str:
     """Return what is wrong with a name, and what it could have been."""
     kind, _, rest = name.partition('.')
     if kind == 'extrinsics':

@@ -4,13 +4,15 @@
 Core Config dataclasses as ROS parameters: declared once, in the dataclass.
 
 A field `f` of section `parse` becomes the parameter `parse.f`; a node's own fields have no
-prefix. Values that a Config refuses are refused with its sentence as the reason.
+prefix. Values that a Config rejects are rejected with its sentence as the reason.
 """
 
-from dataclasses import field
+from collections.abc import Callable, Mapping
+from dataclasses import Field, field
 import sys
+from typing import Any, TypeVar
 
-from hooc_perception.core.config import param
+from hooc_perception.core.config import Config, param
 from hooc_perception.errors import HoocError
 from rcl_interfaces.msg import (
     FloatingPointRange,
@@ -18,18 +20,23 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
+from rcl_interfaces.msg import (
+    Parameter as ParameterMessage,
+)
+from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 _INT64 = 2 ** 63 - 1
+C = TypeVar('C', bound=Config)
 
 
-def fixed_param(*args, **kwargs):
+def fixed_param(*args: Any, **kwargs: Any) -> Any:
     """Declare a parameter that never changes after the node has started; as `param`."""
     declared = param(*args, **kwargs)
     return field(default=declared.default, metadata={**declared.metadata, 'read_only': True})
 
 
-def descriptor(f):
+def descriptor(f: Field) -> ParameterDescriptor:
     """Return the ParameterDescriptor of a Config field: meaning, unit, range, read-only."""
     m = f.metadata
     message = ParameterDescriptor(description=m['doc'] + (f' [{m["unit"]}]' if m['unit'] else ''))
@@ -62,22 +69,22 @@ class Parameters:
     :ivar configs: {section: Config}, always consistent with the node's parameters.
     """
 
-    def __init__(self, node, is_unconfigured):
+    def __init__(self, node: Node, is_unconfigured: Callable[[], bool]) -> None:
         """
         Attach to a node.
 
-        :param is_unconfigured: callable, True while start-up parameters may still change.
+        :param is_unconfigured: whether start-up parameters may still change.
         """
         self._node, self._is_unconfigured = node, is_unconfigured
-        self.configs = {}
+        self.configs: dict[str, Config] = {}
         node.add_on_set_parameters_callback(self._on_set)
 
-    def declare(self, section, config):
+    def declare(self, section: str, config: C) -> C:
         """
         Declare every field of a Config, with the values of `config` as defaults.
 
-        :return: the Config with what YAML files and the command line override.
-        :raises HoocError: where such an override is refused, naming the parameter.
+        :return: the Config with the overrides of YAML files and the command line.
+        :raises HoocError: if such an override is rejected, naming the parameter.
         """
         values = {}
         defaults = config.values()
@@ -91,15 +98,21 @@ class Parameters:
                 raise HoocError(f'parameter {name} of {self._node.get_name()} cannot be used: '
                                 f'{error}') from error
             values[f.name] = _from_ros(value, f)
-        self.configs[section] = _checked(section, config, values)
-        return self.configs[section]
+        declared = self.configs[section] = _checked(section, config, values)
+        return declared
 
-    def __getitem__(self, section):
+    def __getitem__(self, section: str) -> Config:
         """Return the Config of a section, as it is now."""
         return self.configs[section]
 
-    def _on_set(self, parameters):
-        """Accept changes that the Configs accept; say why not otherwise."""
+    def get(self, section: str, kind: type[C]) -> C:
+        """Return the Config of a section, as it is now, which is known to be of a class."""
+        config = self.configs[section]
+        assert isinstance(config, kind)
+        return config
+
+    def _on_set(self, parameters: list[Parameter]) -> SetParametersResult:
+        """Accept the changes that the Configs accept; give the reason otherwise."""
         changed = dict(self.configs)
         for parameter in parameters:
             section, _, name = parameter.name.rpartition('.')
@@ -120,14 +133,14 @@ class Parameters:
         return SetParametersResult(successful=True)
 
 
-def _from_ros(value, f):
+def _from_ros(value: Any, f: Field) -> Any:
     """Return a parameter's value as the type of its field; the Config judges the rest."""
     is_list = isinstance(f.default, tuple) and not isinstance(value, (str, bytes))
     return tuple(value) if is_list and hasattr(value, '__iter__') else value
 
 
-def _checked(section, config, values):
-    """Return `config` with `values`; its complaint names the section as well."""
+def _checked(section: str, config: C, values: Mapping[str, Any]) -> C:
+    """Return `config` with `values`; its error names the section as well."""
     try:
         return config.changed(values)
     except HoocError as error:
@@ -136,7 +149,7 @@ def _checked(section, config, values):
                         if section else text) from error
 
 
-def parameter_message(name, value):
+def parameter_message(name: str, value: Any) -> ParameterMessage:
     """Return the rcl_interfaces/Parameter of a name and a Python value; () is a text list."""
     kind = Parameter.Type.STRING_ARRAY if value in ((), []) else None
     value = list(value) if isinstance(value, tuple) else value

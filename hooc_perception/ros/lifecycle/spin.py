@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Run one node in one process: single-threaded, ends quietly on signals and orphanhood."""
 
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 import ctypes
 import os
@@ -9,25 +10,32 @@ import signal
 import sys
 import threading
 import time
+from types import FrameType
+from typing import Any, TYPE_CHECKING
 
 from hooc_perception.errors import HoocError
 import rclpy
 from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.impl.implementation_singleton import rclpy_implementation
 from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import ok, try_shutdown
+
+if TYPE_CHECKING:
+    from hooc_perception.ros.lifecycle.stage_node import StageNode
 
 PARENT_VARIABLE = 'HOOC_SUPERVISOR_PID'
 # Destroying a node takes less than a second.
 END_GRACE_S = 10
-HEED_S = 0.2    # Python heeds a signal when it is through with waiting
+HEED_S = 0.2    # Python handles a signal only between two waits
 _PR_SET_PDEATHSIG = 1
 
 
-def run_node(make_node, args=None):
+def run_node(make_node: 'Callable[[], StageNode[Any, Any]]',
+             args: Sequence[str] | None = None) -> int:
     """
     Spin the StageNode that `make_node()` returns until a signal; return the exit code.
 
-    An active node is deactivated before it ends, while others still hear it.
+    An active node is deactivated before it ends, while others still receive its messages.
 
     :param args: the ROS arguments, None = those of the process.
     """
@@ -42,60 +50,61 @@ def run_node(make_node, args=None):
         return 0
 
 
-def raise_interrupt(error):
+def raise_interrupt(error: BaseException) -> None:
     """Raise the KeyboardInterrupt that compiled code has turned into another error, if it has."""
     if isinstance(error.__cause__, KeyboardInterrupt):
         raise error.__cause__
 
 
 class _Interrupt:
-    """Raise KeyboardInterrupt for the first signal; those that follow let the end be orderly."""
+    """Raise KeyboardInterrupt for the first signal; later ones do not disturb the shutdown."""
 
-    def __init__(self):
+    def __init__(self) -> None:
         self._heard = False
 
-    def __call__(self, number, frame):
+    def __call__(self, number: int, frame: FrameType | None) -> None:
         if not self._heard:
             self._heard = True
             raise KeyboardInterrupt
 
 
-def _run(make_node, args):
-    # rclpy's own handlers would end the context first, in which nobody can say good-bye.
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+def _run(make_node: 'Callable[[], StageNode[Any, Any]]', args: Sequence[str] | None) -> int:
+    # rclpy's own handlers would shut the context down first, and the node could not leave.
+    rclpy.init(args=None if args is None else list(args),
+               signal_handler_options=SignalHandlerOptions.NO)
     node = None
     try:
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        while rclpy.ok():
+        while ok():
             executor.spin_once(timeout_sec=HEED_S)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
     except rclpy_implementation.RCLError:
-        # Others may end the context at any moment, also between two calls that need it.
-        if rclpy.ok():
+        # The context may be shut down at any moment, also between two calls that need it.
+        if ok():
             raise
     except HoocError as error:
         print(f'[ERROR] {error}', file=sys.stderr, flush=True)
         return 1
     finally:
-        if node is not None and rclpy.ok():
+        if node is not None and ok():
             node.leave()
         with _no_longer_than(END_GRACE_S):
             if node is not None:
                 node.destroy_node()
-            rclpy.try_shutdown()
+            try_shutdown()
     return 0
 
 
 @contextmanager
-def _no_longer_than(seconds):
+def _no_longer_than(seconds: int) -> Iterator[None]:
     """
-    Have the kernel end this process where the block takes longer.
+    Have the kernel end this process if the block takes longer.
 
     Fast DDS can deadlock with its own discovery while a participant is destroyed, with the
-    interpreter's lock held: no thread of ours would get to act.
+    interpreter lock held: no thread of ours could act.
     """
     alarm = getattr(signal, 'alarm', lambda _: None)    # Windows has none
     alarm(seconds)
@@ -105,7 +114,7 @@ def _no_longer_than(seconds):
         alarm(0)
 
 
-def end_with_parent():
+def end_with_parent() -> None:
     """
     End this process when the supervisor that started it ends, however it ends.
 
@@ -123,8 +132,8 @@ def end_with_parent():
     threading.Thread(target=_watch, args=(parent,), daemon=True).start()
 
 
-def _watch(parent, grace_s=5.0):
-    """Wait for another process to become our parent, ask ourselves to end, then insist."""
+def _watch(parent: int, grace_s: float = 5.0) -> None:
+    """Wait until another process becomes our parent, then end: politely first, then at once."""
     while os.getppid() == parent:
         time.sleep(0.5)
     os.kill(os.getpid(), signal.SIGTERM)

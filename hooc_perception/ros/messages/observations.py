@@ -1,0 +1,146 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+An Observation (stage 1) as messages, exactly there and back.
+
+Per camera: rectified depth, its intrinsics, and the segments of the image. Per frame set: one
+row per camera with its levelled pose and the noise. The rest of an ObservedView is computed
+from these.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from geometry_msgs.msg import TransformStamped
+from hooc_perception.core.arrays import BoolArray, Float32Array, Float64Array
+from hooc_perception.core.segment.foreground import observed_view
+from hooc_perception.core.types import Camera, Observation, ObservedView
+from hooc_perception.errors import HoocError
+from hooc_perception.ros.messages.conversions import (
+    camera_from_messages,
+    depth_from_message,
+    labels_from_message,
+    labels_message,
+)
+from hooc_perception.ros.messages.point_clouds import cloud_message, cloud_rows, row_dtype
+import numpy as np
+from sensor_msgs.msg import CameraInfo, Image, PointCloud2
+from std_msgs.msg import Header
+
+# Bits of a pixel in `views/<camera>/segments`.
+FOREGROUND, TABLE = 1, 2
+# The upper three rows of T_world_camera, row by row; x y z is where the camera is.
+POSE_COLUMNS = ('r00', 'r01', 'r02', 'x', 'r10', 'r11', 'r12', 'y', 'r20', 'r21', 'r22', 'z')
+NOISE_COLUMN = 'noise_m'
+_DTYPE = row_dtype([(name, 'f8') for name in (*POSE_COLUMNS, NOISE_COLUMN)])
+# A rotation matrix deviates from orthonormality by rounding alone.
+ORTHONORMAL_WITHIN = 1e-6
+
+
+@dataclass(frozen=True)
+class ViewMessages:
+    """The messages of one camera: intrinsics, rectified depth, segments."""
+
+    info: CameraInfo
+    depth: Image
+    segments: Image
+
+
+def segments_message(view: ObservedView, head: Header) -> Image:
+    """Return the mono8 Image of a view's masks: FOREGROUND and TABLE are bits of each pixel."""
+    return labels_message(view.foreground * np.uint8(FOREGROUND)
+                          | view.table * np.uint8(TABLE), head)
+
+
+def poses_message(observation: Observation, head: Header) -> PointCloud2:
+    """Return the PointCloud2 of the levelled camera poses and the noise, one row per camera."""
+    rows = np.zeros(len(observation.views), _DTYPE)
+    for row, view in zip(rows, observation.views):
+        for name, value in zip(POSE_COLUMNS, view.camera.T_world_camera[:3].ravel()):
+            row[name] = value
+    rows[NOISE_COLUMN] = observation.noise_m
+    return cloud_message(rows, head)
+
+
+def observation_from_messages(views: Mapping[str, ViewMessages],
+                              poses: PointCloud2) -> Observation:
+    """
+    Return the Observation of its messages, equal to the original to the last bit.
+
+    :param views: by camera name, in the order of the rows of `poses`.
+    :raises HoocError: if a message is malformed, or does not belong to the others.
+    """
+    T_world_camera, noise_m = poses_from_message(poses, list(views))
+    observed = tuple(_view(name, messages, T)
+                     for (name, messages), T in zip(views.items(), T_world_camera))
+    if not any(np.isfinite(view.depth).any() for view in observed):
+        raise HoocError(f'views/<camera>/depth_rect of {", ".join(views)} hold no reading at all; '
+                        'is another node publishing on these topics?')
+    return Observation(observed, noise_m)
+
+
+def poses_from_message(message: PointCloud2,
+                       names: Sequence[str]) -> tuple[list[Float64Array], float]:
+    """
+    Return ([T_world_camera (4, 4)], noise in metres) of `views/poses`.
+
+    :param names: of the cameras, one per row.
+    :raises HoocError: if columns are missing or of another type, or the values are no poses.
+    """
+    columns = (*POSE_COLUMNS, NOISE_COLUMN)
+    rows = cloud_rows(message, columns)
+    wrong = [name for name in columns if rows.dtype[name].newbyteorder('=') != np.float64]
+    if wrong:
+        raise HoocError(f'views/poses has fields that are not float64 ({", ".join(wrong)}); is '
+                        'another node publishing on this topic?')
+    if len(rows) != len(names):
+        raise HoocError(f'views/poses has {len(rows)} cameras, but here are {len(names)} '
+                        f'({", ".join(names)}); give all nodes the same parameter cameras')
+    poses = []
+    for name, row in zip(names, rows):
+        T = np.eye(4)
+        T[:3] = np.array([row[column] for column in POSE_COLUMNS]).reshape(3, 4)
+        R = T[:3, :3]
+        if not (np.isfinite(T).all() and np.linalg.det(R) > 0
+                and np.allclose(R @ R.T, np.eye(3), rtol=0, atol=ORTHONORMAL_WITHIN)):
+            raise HoocError(f'views/poses holds no rigid pose for {name}; is another node '
+                            'publishing on this topic?')
+        poses.append(T)
+    noise = np.array(rows[NOISE_COLUMN], np.float64)
+    if not (np.isfinite(noise).all() and (noise > 0).all() and (noise == noise[:1]).all()):
+        raise HoocError('views/poses gives no noise_m in metres, the same in every row; is '
+                        'another node publishing on this topic?')
+    return poses, float(noise[0]) if len(noise) else 0.0
+
+
+def _view(name: str, messages: ViewMessages, T_world_camera: Float64Array) -> ObservedView:
+    """Return the ObservedView of one camera; HoocError if its messages do not fit together."""
+    camera = replace(camera_from_messages(name, messages.info, TransformStamped()),
+                     T_world_camera=T_world_camera)
+    depth = depth_from_message(messages.depth)
+    _check_size(camera, 'depth_rect', depth.shape)
+    foreground, table = _masks(camera, depth, messages.segments)
+    view = observed_view(camera, depth, foreground, table)
+    if not np.isfinite(view.background[table]).all():
+        raise HoocError(f'views/{name}/segments marks the table at pixels whose rays do not meet '
+                        'it; is another node publishing on this topic?')
+    return view
+
+
+def _masks(camera: Camera, depth: Float32Array, message: Image) -> tuple[BoolArray, BoolArray]:
+    """Return the (H, W) masks (foreground, table) of an Image; HoocError if it is no such."""
+    segments = labels_from_message(message)
+    _check_size(camera, 'segments', segments.shape)
+    foreground = segments & FOREGROUND > 0
+    if segments.max(initial=0) > FOREGROUND | TABLE or not np.isfinite(depth[foreground]).all():
+        raise HoocError(f'views/{camera.name}/segments has unknown bits, or foreground at pixels '
+                        'without a reading; is another node publishing on this topic?')
+    return foreground, segments & TABLE > 0
+
+
+def _check_size(camera: Camera, suffix: str, shape: tuple[int, ...]) -> None:
+    """Raise HoocError if an image is not of the size that its camera_info gives."""
+    if shape != (camera.height, camera.width):
+        raise HoocError(f'views/{camera.name}/{suffix} is {shape[1]} x {shape[0]} pixels, but its '
+                        f'camera_info is for {camera.width} x {camera.height}; is another node '
+                        'publishing on these topics?')

@@ -1,8 +1,8 @@
 // Copyright 2026 The hooc_perception authors
 // SPDX-License-Identifier: Apache-2.0
 //
-// Print the objects of every answer. Needs rclcpp, sensor_msgs, std_msgs and nlohmann-json3-dev,
-// nothing of this package.
+// Print the objects of every result. Needs rclcpp, sensor_msgs, std_msgs and nlohmann-json3-dev,
+// and nothing of this package.
 
 #include <cstdint>
 #include <cstdio>
@@ -39,7 +39,7 @@ std::vector<Object> objects_of(const sensor_msgs::msg::PointCloud2 & cloud)
   return objects;
 }
 
-// What the class ids mean, from objects/labels.
+// The names of the class ids, from objects/labels.
 std::map<uint16_t, std::string> names_of(const std::string & labels)
 {
   std::map<uint16_t, std::string> names;
@@ -57,7 +57,7 @@ public:
   ListObjects()
   : Node("list_objects", "/hooc")
   {
-    // Latched: who comes late gets the last answer at once.
+    // Latched: a late subscriber gets the last result at once.
     const auto latched = rclcpp::QoS(1).reliable().transient_local();
     labels_ = create_subscription<std_msgs::msg::String>(
       "objects/labels", latched,

@@ -1,18 +1,20 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The four nodes of the chain for live cameras, brought to active one after the other.
+Start the four nodes of the chain for live cameras, and configure and activate them.
 
-For ROS installations; elsewhere `hooc up` does the same.
+This needs a ROS installation; `hooc up` does the same without one.
 
     ros2 launch hooc_perception perception.launch.py model:=MODEL [cameras:="[left, right]"]
 """
 
+from collections.abc import Callable
 import os
+from typing import Any
 
 from ament_index_python.packages import get_package_share_directory
 from hooc_perception.chain import CHAIN
-from launch import LaunchDescription
+from launch import LaunchContext, LaunchDescription, LaunchDescriptionEntity
 from launch.actions import DeclareLaunchArgument, EmitEvent, OpaqueFunction, RegisterEventHandler
 from launch.conditions import IfCondition
 from launch.event_handlers import OnProcessStart
@@ -25,13 +27,14 @@ from lifecycle_msgs.msg import Transition
 import yaml
 
 
-def lifecycle_node(name, namespace, parameters, autostart):
-    """Return the actions that start one node and, with `autostart`, bring it to active."""
+def lifecycle_node(name: str, namespace: LaunchConfiguration, parameters: list[Any],
+                   autostart: LaunchConfiguration) -> list[LaunchDescriptionEntity]:
+    """Return the actions that start one node and, with `autostart`, activate it."""
     node = LifecycleNode(package='hooc_perception', executable=name, name=name,
                          namespace=namespace, parameters=parameters, output='screen',
                          respawn=LaunchConfiguration('respawn'), respawn_delay=2.0)
 
-    def change(transition):
+    def change(transition: int) -> EmitEvent:
         return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(node),
                                            transition_id=transition),
                          condition=IfCondition(autostart))
@@ -39,44 +42,46 @@ def lifecycle_node(name, namespace, parameters, autostart):
     activate = RegisterEventHandler(OnStateTransition(
         target_lifecycle_node=node, start_state='configuring', goal_state='inactive',
         entities=[change(Transition.TRANSITION_ACTIVATE)]))
-    # Every process that starts is configured, also one that takes the place of a dead one.
+    # Every process that starts is configured, also one that replaces a dead one.
     configure = RegisterEventHandler(OnProcessStart(
         target_action=node, on_start=[change(Transition.TRANSITION_CONFIGURE)]))
     return [activate, configure, node]
 
 
-def _truth(text):
-    """Return the truth value of an argument."""
+def _boolean(text: str) -> bool:
+    """Return the Boolean value of an argument."""
     return text.lower() in ('true', '1', 'yes', 'on')
 
 
-def chain(context):
-    """Return the actions of the four nodes; only now are the arguments known as text."""
+def chain(context: LaunchContext) -> list[LaunchDescriptionEntity]:
+    """Return the actions of the four nodes; the arguments are known as text only now."""
     given = {name: LaunchConfiguration(name).perform(context) for name in (
         'model', 'profile', 'cameras', 'target_frame', 'seed', 'use_sim_time', 'params_file')}
-    own = {'model': os.path.abspath(os.path.expanduser(given['model']))}
-    # What is not given is up to the file, which stands before.
-    for name, kind in (('profile', str), ('target_frame', str), ('seed', int),
-                       ('use_sim_time', _truth), ('cameras', yaml.safe_load)):
+    own: dict[str, Any] = {'model': os.path.abspath(os.path.expanduser(given['model']))}
+    kinds: dict[str, Callable[[str], Any]] = {
+        'profile': str, 'target_frame': str, 'seed': int, 'use_sim_time': _boolean,
+        'cameras': yaml.safe_load}
+    # The file, which comes first, sets what is not given.
+    for name, kind in kinds.items():
         if given[name] and (value := kind(given[name])) != []:
             own[name] = value
-    actions = []
+    actions: list[LaunchDescriptionEntity] = []
     for name in CHAIN:
         actions += lifecycle_node(name, LaunchConfiguration('namespace'),
                                   [given['params_file'], own], LaunchConfiguration('autostart'))
     return actions
 
 
-def generate_launch_description():
+def generate_launch_description() -> LaunchDescription:
     """Return the description that `ros2 launch` runs."""
     params = os.path.join(get_package_share_directory('hooc_perception'), 'config',
                           'perception.yaml')
     return LaunchDescription([
-        DeclareLaunchArgument('model', description='folder that hooc train wrote'),
+        DeclareLaunchArgument('model', description='model folder that hooc train wrote'),
         DeclareLaunchArgument('profile', default_value='',
                               description='paper, best or fast; empty: see params_file'),
         DeclareLaunchArgument('cameras', default_value='',
-                              description='names as a list; empty: see params_file'),
+                              description='list of names; empty: see params_file'),
         DeclareLaunchArgument('target_frame', default_value='',
                               description='empty: see params_file'),
         DeclareLaunchArgument('seed', default_value='', description='empty: see params_file'),
@@ -86,10 +91,10 @@ def generate_launch_description():
         DeclareLaunchArgument('autostart', default_value='true',
                               description='configure and activate the nodes'),
         DeclareLaunchArgument('respawn', default_value='true',
-                              description='start a node again that has died'),
+                              description='restart a node that has died'),
         DeclareLaunchArgument(
             'params_file', default_value=params,
-            description='parameters of the nodes; what neither it nor an argument says is '
-                        "the model's or the nodes' default"),
+            description='parameters of the nodes; the model and the nodes have defaults for '
+                        'what neither this file nor an argument sets'),
         OpaqueFunction(function=chain),
     ])

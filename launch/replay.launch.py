@@ -1,7 +1,7 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-A recorded bag as live cameras, and the chain that parses it.
+Play a bag as live cameras, and start the chain that parses it.
 
     ros2 launch hooc_perception replay.launch.py bag:=BAG model:=MODEL
 """
@@ -26,7 +26,7 @@ from launch_ros.parameter_descriptions import ParameterValue
 from lifecycle_msgs.msg import Transition
 
 
-def generate_launch_description():
+def generate_launch_description() -> LaunchDescription:
     """Return the description that `ros2 launch` runs."""
     here = os.path.join(get_package_share_directory('hooc_perception'), 'launch')
     player = LifecycleNode(
@@ -37,18 +37,18 @@ def generate_launch_description():
                      'loop': ParameterValue(LaunchConfiguration('loop'), value_type=bool),
                      'match_timeout_s': 120.0}])
 
-    def change(transition):
+    def change(transition: int) -> EmitEvent:
         return EmitEvent(event=ChangeState(lifecycle_node_matcher=matches_action(player),
                                            transition_id=transition))
 
     return LaunchDescription([
         DeclareLaunchArgument('bag', description='rosbag2 folder, .mcap or .db3 file'),
-        DeclareLaunchArgument('model', description='folder that hooc train wrote'),
+        DeclareLaunchArgument('model', description='model folder that hooc train wrote'),
         DeclareLaunchArgument('rate', default_value='1.0',
-                              description='speed; 0 = as fast as the chain answers'),
+                              description='speed; 0 = as fast as the chain processes frame sets'),
         DeclareLaunchArgument('loop', default_value='false'),
         DeclareLaunchArgument('namespace', default_value='hooc'),
-        # Handlers come before the events that they wait for.
+        # Handlers must be registered before their events occur.
         RegisterEventHandler(OnStateTransition(
             target_lifecycle_node=player, start_state='configuring', goal_state='inactive',
             entities=[change(Transition.TRANSITION_ACTIVATE)])),

@@ -28,21 +28,27 @@ class Retractor:
     """
 
     def __init__(self, supervisor: Supervisor) -> None:
-        """Take over the parameters of the parsing node of an entered Supervisor, if any."""
-        self._node, self._possible = supervisor.node, PARSING in supervisor.names
+        """Subscribe to the results in the namespace of an entered Supervisor."""
+        self._supervisor, self._node = supervisor, supervisor.node
+        self._possible = PARSING in supervisor.names
         self._displayed = Displayed(self._node)
         self._retraction: Retraction | None = None      # while it lasts
         self._until = self._published = 0.0             # time.monotonic()
         self._parsing: dict[str, Any] = {}
         self._reset = self._node.create_client(Trigger, 'reset')
+
+    def ask_parsing(self) -> None:
+        """Adapt to the current parameters of the parsing node, if there is one."""
         if self._possible:
-            self.adapt(supervisor.get_parameters(PARSING, OF_PARSING))
+            self.adapt(self._supervisor.get_parameters(PARSING, OF_PARSING))
 
     def adapt(self, parameters: Mapping[str, Any]) -> None:
         """Follow changed parameters of the parsing node: its frame, its clock, its topics."""
         self._parsing.update((name, parameters[name]) for name in OF_PARSING
                              if name in parameters)
         known = self._parsing
+        if len(known) < len(OF_PARSING):
+            return      # a change before `ask_parsing` knows the rest
         if known['use_sim_time'] != self._node.get_parameter('use_sim_time').value:
             self._node.set_parameters([Parameter('use_sim_time', value=known['use_sim_time'])])
         if known['planning_scene'] != 'off':

@@ -53,6 +53,8 @@ class Watchdog:
         self._heartbeats = {name: Heartbeat(supervisor, name, hung_s) for name in supervisor.names}
         self._retractor = Retractor(supervisor)
         self._node.create_subscription(ParameterEvent, '/parameter_events', self._on_event, 100)
+        # After the subscription: no change in between is missed.
+        self._retractor.ask_parsing()
 
     def spin(self, seconds: float = 0.05) -> None:
         """Serve callbacks for a moment, then go on with the restarts of dead nodes."""

@@ -42,7 +42,8 @@ def launch(monkeypatch, repository):
     configuration = recorder('LaunchConfiguration', optional=('default',), positional=1)
     configuration.perform = lambda self, context: GIVEN[self.args[0]]
     modules = {
-        'launch': {'LaunchDescription': recorder('LaunchDescription', positional=1)},
+        'launch': {'LaunchDescription': recorder('LaunchDescription', positional=1),
+                   'LaunchContext': object, 'LaunchDescriptionEntity': object},
         'launch.actions': {
             'DeclareLaunchArgument': recorder(
                 'DeclareLaunchArgument', (), ('default_value', 'description', 'choices', *action),

@@ -15,7 +15,7 @@ from hooc_perception.errors import HoocError
 if TYPE_CHECKING:
     from hooc_perception.io.bags.reader import BagScene
     from hooc_perception.supervisor.bags import BagRunner
-    from hooc_perception.supervisor.collector import Answer
+    from hooc_perception.supervisor.collector import FrameSetResult
     from hooc_perception.trained.folder import ModelFolder
 
 # Upper limits of the node parameters `seed` and `wait_for_answer_s`.
@@ -143,12 +143,12 @@ def model_defaults(model: 'ModelFolder') -> dict[str, dict[str, Any]]:
 
 
 def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
-         ) -> 'tuple[dict[str, Answer], dict[str, HoocError], str, int]':
+         ) -> 'tuple[dict[str, FrameSetResult], dict[str, HoocError], str, int]':
     """
     Play all bags through the nodes.
 
-    :return: ({scene: Answer}, {scene: HoocError}, profile, seed); the last two as the nodes
-        report them.
+    :return: ({scene: FrameSetResult}, {scene: HoocError}, profile, seed); the last two as the
+        nodes report them.
     """
     from hooc_perception.supervisor.bags import BagRunner, MATCH_TIMEOUT_S
     from hooc_perception.supervisor.supervisor import Supervisor
@@ -169,9 +169,9 @@ def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
 
 
 def play_all(runner: 'BagRunner', bags: 'Iterable[BagScene]',
-             ) -> 'tuple[dict[str, Answer], dict[str, HoocError]]':
-    """Return ({scene: Answer}, {scene: HoocError}); after a failure the next scene follows."""
-    answers: dict[str, Answer] = {}
+             ) -> 'tuple[dict[str, FrameSetResult], dict[str, HoocError]]':
+    """Return the results and errors by scene; after a failure the next scene follows."""
+    answers: dict[str, FrameSetResult] = {}
     failures: dict[str, HoocError] = {}
     over = None
     for bag in bags:
@@ -190,7 +190,8 @@ def play_all(runner: 'BagRunner', bags: 'Iterable[BagScene]',
     return answers, failures
 
 
-def write_report(args: Namespace, bags: 'Sequence[BagScene]', answers: 'Mapping[str, Answer]',
+def write_report(args: Namespace, bags: 'Sequence[BagScene]',
+                 answers: 'Mapping[str, FrameSetResult]',
                  entries: Sequence[dict[str, Any]], model: 'ModelFolder', note: str) -> None:
     """Write DIR/report.html from what the nodes have published."""
     from hooc_perception.evaluation.report.page import write_report as write_page

@@ -17,7 +17,7 @@ import sys
 GUARD = '_ROS_WHEELS_BOOTSTRAP_COMPLETE'     # the bootstrapper's own: it then has nothing to do
 
 
-def order_libraries():
+def order_libraries() -> None:
     """Start Python again with this environment's libraries first, unless they already are."""
     site = os.path.dirname(os.path.abspath(__file__))
     own = [os.path.join(sys.prefix, 'lib'),
@@ -31,7 +31,7 @@ def order_libraries():
     os.execv(sys.executable, sys.orig_argv)
 
 
-def order_modules():
+def order_modules() -> None:
     """Move the entries of PYTHONPATH that hold a second rclpy to the end of sys.path."""
     named = [os.path.abspath(path) for path in os.environ.get('PYTHONPATH', '').split(os.pathsep)
              if path]

@@ -24,7 +24,7 @@ COMMANDS = {
     'demo': 'replay the bundled scene through the five nodes and show what was found',
     'convert': 'write a scene set or BOP dataset as rosbag2 bags, one per scene',
     'train': "train a model from a set's generic meshes and cameras, never its scenes",
-    'parse': 'find the objects of a scene set in one process, without ROS',
+    'parse': 'find the objects of a scene set or a bag in one process, without ROS',
     'run': 'find the objects of recorded bags through the five nodes',
     'up': 'start the nodes for live cameras, until interrupted',
     'replay': 'play a bag as live cameras',

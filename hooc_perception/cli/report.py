@@ -59,7 +59,7 @@ class _Source:
 
 
 def run(args: Namespace) -> None:
-    """Write the page and, where it is asked for, the recording."""
+    """Write the page and, if requested, the recording."""
     from hooc_perception.cli.places import file_place, page_place
     from hooc_perception.cli.scoring import warn_of_others
     from hooc_perception.evaluation.matching import in_frame_of

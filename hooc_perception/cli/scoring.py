@@ -41,7 +41,7 @@ def warn_of_others(path: str | Path, others: str, place: str | Path) -> None:
 def print_tables(tables: Sequence['Table'], markdown: str | None = None,
                  details: Sequence['Table'] = ()) -> None:
     """
-    Print tables and, where it is asked for, write them as Markdown.
+    Print tables and, if requested, write them as Markdown.
 
     :param markdown: file to write; None = none.
     :param details: tables for that file alone, after the others.

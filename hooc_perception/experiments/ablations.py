@@ -55,7 +55,7 @@ class _Measure:
     One way to score: by poses or by masks.
 
     :ivar key: what a result holds where it was scored like this.
-    :ivar header: columns of `figures`; `change` names the one whose change is told.
+    :ivar header: columns of `figures`; `change` names the one whose change has a column.
     :ivar verdicts: result -> [whether each object counts there], in the set's order.
     """
 
@@ -121,7 +121,7 @@ def turned_right(result: Mapping[str, Any]) -> float:
 
 
 def _posed(result: dict[str, Any]) -> tuple[float, ...]:
-    """Return found, localized, tight, turned right, false categories."""
+    """Return found, localized, < 2 cm, < 15 deg, false categories."""
     mean = result['mean']
     return (*(mean[c] for c in ('found', 'localized', 'tight')), turned_right(result),
             mean['false_categories'])

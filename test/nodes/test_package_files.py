@@ -27,7 +27,7 @@ def own_config(name):
 def test_launch_files_compile_and_name_what_exists(repository, name):
     text = (repository / 'launch' / f'{name}.launch.py').read_text()
     compile(text, f'{name}.launch.py', 'exec')
-    assert 'def generate_launch_description():' in text
+    assert 'def generate_launch_description() -> LaunchDescription:' in text
     named = set(re.findall(r"'(\w+_node)'", text))
     assert (named or 'import CHAIN' in text) and named <= set(NODES)
     for parameter in re.findall(r'^ +parameters=\[\{(.*?)\}\]', text, re.DOTALL | re.MULTILINE):

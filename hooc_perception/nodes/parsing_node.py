@@ -33,7 +33,12 @@ from hooc_perception.ros.messages.stages import (
     candidates_from_messages,
     probabilities_from_message,
 )
-from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_of, tell
+from hooc_perception.ros.outputs.adapters.choose import (
+    AdapterConfig,
+    adapters_of,
+    clear_all,
+    publish_all,
+)
 from hooc_perception.ros.outputs.detect_service import DetectService
 from hooc_perception.ros.outputs.detected import detected_scene
 from hooc_perception.ros.outputs.object_output import ObjectOutput
@@ -151,7 +156,7 @@ class Parsing:
         age_s = (node.now_ns() - stamp_ns) * 1e-9
         self.output.publish(parsed, ids, stamp_ns, frame, age_s, left)
         self._answered = time.monotonic()
-        tell(node, self.adapters, 'publish', scene)
+        publish_all(node, self.adapters, scene)
         node.detect.answer(scene)
         node.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
                             energy=float(parsed.energy.total), age_s=age_s)
@@ -161,7 +166,7 @@ class Parsing:
         self._answered = None
         now = self._node.now_ns(), self._node.config.target_frame
         self.output.clear(*now)
-        tell(self._node, self.adapters, 'clear', *now)
+        clear_all(self._node, self.adapters, *now)
 
     def _on_enable(self, request: SetBool.Request,
                    response: SetBool.Response) -> SetBool.Response:

@@ -4,7 +4,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 from hooc_perception.core.config import Config, param
 from hooc_perception.ros.lifecycle.stage_node import StageNode
@@ -72,8 +72,3 @@ def _guarded(node: StageNode, adapter: Adapter, what: str, call: Callable[[], No
     name = type(adapter).__name__
     if node.guarded(call, name, f'its {what} is skipped')():
         node.diagnostics.ok(name)
-
-
-def tell(node: StageNode, adapters: Sequence[Adapter], what: str, *args: Any) -> None:
-    """Call `publish_all` or `clear_all` by name."""
-    {'publish': publish_all, 'clear': clear_all}[what](node, adapters, *args)

@@ -18,6 +18,12 @@ from hooc_perception.core.types import Candidates, PixelProbabilities
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.inputs.raw_frames import RawFrames
 from hooc_perception.ros.messages import conversions as c
+from hooc_perception.ros.messages.observations import (
+    observation_from_messages,
+    poses_message,
+    segments_message,
+    ViewMessages,
+)
 from hooc_perception.ros.messages.stages import (
     candidates_from_messages,
     candidates_messages,
@@ -124,7 +130,25 @@ def _stage_case(rng: np.random.Generator, _: Path) -> None:
     candidates_from_messages(poses, attributes, 1)
 
 
+def _observation_case(rng: np.random.Generator, _: Path) -> None:
+    """Pass the corrupted messages of ingestion to the reader of the later nodes."""
+    observation, head = observe([rectify(v) for v in _SCENE.depth()]), c.header(5, 'table')
+    poses, views = poses_message(observation, head), {}
+    if rng.random() < 0.5:
+        _spoil(poses, rng, 0.1)
+    for field in poses.fields:
+        _spoil(field, rng, 0.02)
+    for view in observation.views:
+        messages = (c.camera_info_message(view.camera, head), c.depth_message(view.depth, head),
+                    segments_message(view, head))
+        for message in messages:
+            if rng.random() < 0.2:
+                _spoil(message, rng, 0.1)
+        views[view.camera.name] = ViewMessages(*messages)
+    observation_from_messages(views, poses)
+
+
 def message_cases() -> dict[str, Callable[[np.random.Generator, Path], None]]:
     """Return {kind: function(rng, folder)}."""
     return {'messages of a camera': _camera_case, 'bytes on the wire': _wire_case,
-            'messages of a stage': _stage_case}
+            'messages of a stage': _stage_case, 'messages of ingestion': _observation_case}

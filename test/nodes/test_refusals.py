@@ -8,9 +8,10 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
+from hooc_perception.nodes import ingestion_node
 from hooc_perception.nodes.replay_node import ReplayNode
 from hooc_perception.ros.inputs import view_input
-from hooc_perception.ros.messages.conversions import header
+from hooc_perception.ros.messages.conversions import header, nanoseconds
 from hooc_perception.ros.qos import qos
 from std_msgs.msg import Header  # noqa: E402
 
@@ -65,6 +66,27 @@ def test_a_node_that_computes_is_not_taken_for_inactive(bench, make_chain, monke
     assert bench.spin(lambda: 'classify' in stages.given)
     bench.rest(1.5)
     assert 'not_active' not in bench.reasons(bench.chain[3]).get('input', ())
+
+
+@pytest.mark.parametrize('error, thing', [
+    (HoocError('no table in sight'), 'views'), (ZeroDivisionError('a surprise'), 'input')])
+def test_a_set_that_stage_1_cannot_use_is_refused_by_ingestion(bench, make_chain, monkeypatch,
+                                                               error, thing):
+    stages, send = make_chain(parameters=LONG)
+    answers = bench.hear(PoseArray, 'objects/poses', qos('objects/poses'))
+    refused = bench.hear(Header, 'views/refused', qos('views/refused'))
+
+    def fail(views, config):
+        raise error
+    with monkeypatch.context() as patch:
+        patch.setattr(ingestion_node, 'observe', fail)
+        stamp = send()
+        assert bench.spin(lambda: refused)
+    assert nanoseconds(refused[0].stamp) == stamp and refused[0].frame_id == 'table'
+    assert str(error) in bench.reasons(bench.chain[0])[thing][1]
+    assert not stages.given and not answers
+    send()
+    assert bench.spin(lambda: answers)
 
 
 def test_views_of_another_frame_are_refused(bench, make_chain):

@@ -101,7 +101,7 @@ def poses_from_message(message: PointCloud2,
         T = np.eye(4)
         T[:3] = np.array([row[column] for column in POSE_COLUMNS]).reshape(3, 4)
         R = T[:3, :3]
-        if not (np.isfinite(T).all() and np.linalg.det(R) > 0
+        if not (np.isfinite(T).all() and (np.abs(R) < 2).all() and np.linalg.det(R) > 0
                 and np.allclose(R @ R.T, np.eye(3), rtol=0, atol=ORTHONORMAL_WITHIN)):
             raise HoocError(f'views/poses holds no rigid pose for {name}; is another node '
                             'publishing on this topic?')
@@ -120,7 +120,8 @@ def _view(name: str, messages: ViewMessages, T_world_camera: Float64Array) -> Ob
     depth = depth_from_message(messages.depth)
     _check_size(camera, 'depth_rect', depth.shape)
     foreground, table = _masks(camera, depth, messages.segments)
-    view = observed_view(camera, depth, foreground, table)
+    with np.errstate(over='ignore'):    # with absurd intrinsics
+        view = observed_view(camera, depth, foreground, table)
     if not np.isfinite(view.background[table]).all():
         raise HoocError(f'views/{name}/segments marks the table at pixels whose rays do not meet '
                         'it; is another node publishing on this topic?')

@@ -66,7 +66,7 @@ def drop_stale(environment=os.environ, package=PACKAGE):
     file that it calls has: after an update, old code would run inside of new.
     """
     now = hashlib.sha256()
-    for source in sorted(package.glob('core/**/kernels/*.py')):
+    for source in sorted(package.glob('**/kernels/*.py')):
         state = source.stat()
         name = source.relative_to(package).as_posix()
         now.update(f'{name} {state.st_mtime_ns} {state.st_size}\n'.encode())
@@ -86,10 +86,9 @@ def drop_stale(environment=os.environ, package=PACKAGE):
 def _place(environment, package):
     """Return (folder for a stamp, patterns below it of folders with compiled kernels)."""
     if not environment.get('NUMBA_CACHE_DIR') and writable(package):
-        return package, ('core/**/kernels/__pycache__', 'training/__pycache__',
-                         'synthesis/__pycache__')
+        return package, ('**/kernels/__pycache__', 'synthesis/__pycache__')
     root = environment.get('NUMBA_CACHE_DIR') or Path(_home(environment)) / 'numba'
-    return Path(root), ('kernels_*', 'training_*', 'synthesis_*')
+    return Path(root), ('kernels_*', 'synthesis_*')
 
 
 def _home(environment):

@@ -113,8 +113,7 @@ def sense(depth, ids, camera, rng, config=SensorConfig(), translucent_ids=(), be
         return np.where(np.isfinite(clean), clean, np.float32(np.nan)), ids
     n = max(int(ids.max(initial=-1)), max(translucent_ids, default=-1)) + 1
     K = camera.K
-    cosine = sensor_kernels.incidence(clean, K[0, 0], K[1, 1], K[0, 2], K[1, 2],
-                                      config.edge_m)
+    cosine = sensor_kernels.incidence(clean, K[0, 0], K[1, 1], K[0, 2], K[1, 2])
     if normals is not None:
         cosine = _cosine_from_normals(normals, K)
     drift = smooth_field(depth.shape, rng) * np.float32(config.drift_m)
@@ -130,12 +129,16 @@ def sense(depth, ids, camera, rng, config=SensorConfig(), translucent_ids=(), be
     glass[list(translucent_ids)] = True
     kernel = (sensor_kernels.time_of_flight if config.model == 'kinect_v2'
               else sensor_kernels.structured_light)
-    return kernel(clean, ids, cosine, drift, ripple, reflectance, glass, shift,
-                  clean if behind is None else np.ascontiguousarray(behind, np.float32),
-                  behind is not None, rng, K[0, 0], config.noise_scale, config.lateral_px,
-                  config.edge_m, config.flying, config.edge_dropout, config.random_dropout,
-                  config.signal_floor, config.range_low, config.range_high,
-                  config.glass_dropout, config.quantum_m)
+    return kernel(
+        sensor_kernels.Clean(
+            clean, ids, cosine,
+            clean if behind is None else np.ascontiguousarray(behind, np.float32),
+            behind is not None, K[0, 0]),
+        sensor_kernels.Surfaces(reflectance, glass, shift, ripple, drift),
+        sensor_kernels.Errors(
+            config.noise_scale, config.lateral_px, config.edge_m, config.flying,
+            config.edge_dropout, config.random_dropout, config.signal_floor, config.range_low,
+            config.range_high, config.glass_dropout, config.quantum_m), rng)
 
 
 def simulate_kinect_v2(depth, ids, normals, camera, rng, config=SensorConfig(),

@@ -3,13 +3,73 @@
 """Pixel loops of the simulated depth cameras; see sensor.py for meaning and sources."""
 
 import math
+from typing import NamedTuple
 
+from hooc_perception.core.arrays import BoolArray, Float32Array, Float64Array, Int32Array
 import numba as nb
 import numpy as np
 
+# Kinect v1: distance from camera to projector, and the step of 1 / depth of the readings.
+BASELINE_M = 0.075
+DISPARITY_STEP = 0.00285
+# Least cosine between normal and ray of the time-of-flight model.
+LEAST_COSINE = 0.02
+
+
+class Clean(NamedTuple):
+    """
+    What a perfect camera would see.
+
+    :ivar depth: (H, W) float32 metres, inf where there is nothing.
+    :ivar ids: (H, W) int32, -1 for the surroundings.
+    :ivar cosine: (H, W) float32 between surface normal and ray.
+    :ivar behind: (H, W) float32 depth without the translucent objects; read if `has_behind`.
+    :ivar fx: focal length, pixels.
+    """
+
+    depth: Float32Array
+    ids: Int32Array
+    cosine: Float32Array
+    behind: Float32Array
+    has_behind: bool
+    fx: float
+
+
+class Surfaces(NamedTuple):
+    """
+    What the light meets, and how the image drifts.
+
+    :ivar reflectance: (n + 1,) float64 of every id, the last one of the surroundings.
+    :ivar glass: (n + 1,) bool, which are translucent; shift (n + 1,) float64 their mean shift
+        away from the camera, metres.
+    :ivar ripple: (H, W) float32 metres on top of the shift; drift (H, W) float32 metres.
+    """
+
+    reflectance: Float64Array
+    glass: BoolArray
+    shift: Float64Array
+    ripple: Float32Array
+    drift: Float32Array
+
+
+class Errors(NamedTuple):
+    """The figures of a SensorConfig by the same names, see there."""
+
+    noise_scale: float
+    lateral_px: float
+    edge_m: float
+    flying: float
+    edge_dropout: float
+    random_dropout: float
+    signal_floor: float
+    range_low: float
+    range_high: float
+    glass_dropout: float
+    quantum_m: float
+
 
 @nb.njit(cache=True)
-def upsample(knots, height, width):
+def upsample(knots: Float32Array, height: int, width: int) -> Float32Array:
     """Return (height, width) float32: cubic B-spline surface over knots (m, m), unit variance."""
     m = knots.shape[0] - 3
     out = np.empty((height, width), np.float32)
@@ -37,7 +97,8 @@ def upsample(knots, height, width):
 
 
 @nb.njit(cache=True)
-def _spline(t, w):
+def _spline(t: float, w: Float64Array) -> None:
+    """Fill w (4,) with the weights of a uniform cubic B-spline at t in 0..1."""
     w[0] = (1 - t) ** 3 / 6
     w[1] = (3 * t ** 3 - 6 * t ** 2 + 4) / 6
     w[2] = (-3 * t ** 3 + 3 * t ** 2 + 3 * t + 1) / 6
@@ -45,7 +106,7 @@ def _spline(t, w):
 
 
 @nb.njit(cache=True)
-def incidence(depth, fx, fy, cx, cy, edge_m):
+def incidence(depth: Float32Array, fx: float, fy: float, cx: float, cy: float) -> Float32Array:
     """
     Return (H, W) float32 cosines between surface normal and ray, from the depth's slopes.
 
@@ -70,7 +131,8 @@ def incidence(depth, fx, fy, cx, cy, edge_m):
 
 
 @nb.njit(cache=True)
-def _slope(before, here, after):
+def _slope(before: float, here: float, after: float) -> float:
+    """Return the smaller of the two one-sided differences, 0 where there is none."""
     left, right = here - before, after - here
     if not abs(left) < np.inf:
         return right if abs(right) < np.inf else 0.0
@@ -83,7 +145,7 @@ def _slope(before, here, after):
 
 
 @nb.njit(cache=True)
-def _edge_partner(depth, v, u, z, edge_m):
+def _edge_partner(depth: Float32Array, v: int, u: int, z: float, edge_m: float) -> float:
     """Return the depth of the 4-neighbour beyond the largest step over edge_m, or z."""
     h, w = depth.shape
     best, partner = edge_m, z
@@ -98,7 +160,8 @@ def _edge_partner(depth, v, u, z, edge_m):
 
 
 @nb.njit(cache=True)
-def _source(depth, v, u, lateral, rng):
+def _source(depth: Float32Array, v: int, u: int, lateral: float,
+            rng: np.random.Generator) -> tuple[int, int]:
     """Return (row, column) that pixel (v, u) looks at after lateral noise."""
     h, w = depth.shape
     vv = min(max(int(round(v + lateral * rng.standard_normal())), 0), h - 1)
@@ -107,7 +170,7 @@ def _source(depth, v, u, lateral, rng):
 
 
 @nb.njit(cache=True)
-def _near_edge(depth, v, u, z, edge_m):
+def _near_edge(depth: Float32Array, v: int, u: int, z: float, edge_m: float) -> bool:
     """Return whether some 4-neighbour at 2 pixels or nearer is a step over edge_m away."""
     h, w = depth.shape
     for k in range(8):
@@ -121,14 +184,62 @@ def _near_edge(depth, v, u, z, edge_m):
 
 
 @nb.njit(cache=True)
-def time_of_flight(depth, ids, cosine, drift, ripple, reflectance, glass, shift, behind,
-                   has_behind, rng, fx, noise_scale, lateral_px, edge_m, flying, edge_dropout,
-                   random_dropout, signal_floor, range_low, range_high, glass_dropout,
-                   quantum_m):
-    """Return (depth float32 with NaN, ids int32) of a Kinect v2; arguments as in `sense`."""
+def _through_glass(clean: Clean, surfaces: Surfaces, which: int, v: int, u: int,
+                   z: float) -> float:
+    """Return the depth that is measured at a translucent object: behind its surface."""
+    far = surfaces.shift[which] + surfaces.ripple[v, u]
+    if clean.has_behind and clean.behind[v, u] < np.inf:
+        far = min(far, max(np.float64(clean.behind[v, u]) - z, 0.0))
+    return z + max(far, 0.0)
+
+
+@nb.njit(cache=True)
+def _quantised(z: float, quantum_m: float) -> float:
+    """Return z rounded to whole steps of the readings."""
+    if quantum_m > 0:
+        z = quantum_m * math.floor(z / quantum_m + 0.5)
+    return z
+
+
+@nb.njit(cache=True)
+def _axial_noise_v2(z: float, cosine: float) -> float:
+    """Return the standard deviation in metres of a Kinect v2 (Fankhauser et al. 2015)."""
+    theta = math.acos(min(cosine, 1.0))
+    # The published formula gives millimetres for z in metres.
+    sigma = 1.5 - 0.5 * z + 0.3 * z * z + 0.1 * z * math.sqrt(z) * (
+        theta / (0.5 * math.pi - theta + 0.02)) ** 2
+    return 1e-3 * min(sigma, 15.0)
+
+
+@nb.njit(cache=True)
+def _axial_noise_v1(z: float, cosine: float) -> float:
+    """Return the standard deviation in metres of a Kinect v1 (Nguyen et al. 2012)."""
+    theta = math.acos(min(max(cosine, 0.02), 1.0))
+    return 0.0012 + 0.0019 * (z - 0.4) ** 2 + 0.0001 / math.sqrt(z) * (
+        theta / (0.5 * math.pi - theta + 0.02)) ** 2
+
+
+@nb.njit(cache=True)
+def _flying(z: float, other: float, errors: Errors, rng: np.random.Generator) -> float:
+    """Return the reading at the edge of surfaces at depths z and other; NaN where it drops out."""
+    q = rng.random()
+    if q < errors.edge_dropout:
+        return np.nan
+    if q < errors.edge_dropout + errors.flying:
+        # The nearer surface sends more light back: weights lean towards it.
+        a = rng.random() ** 2
+        z += a * (other - z) if other > z else (1.0 - a) * (other - z) * 0.5
+    return z
+
+
+@nb.njit(cache=True)
+def time_of_flight(clean: Clean, surfaces: Surfaces, errors: Errors,
+                   rng: np.random.Generator) -> tuple[Float32Array, Int32Array]:
+    """Return (depth float32 with NaN, ids int32) of a Kinect v2, see `sensor.sense`."""
+    depth, ids = clean.depth, clean.ids
     h, w = depth.shape
-    n = reflectance.shape[0] - 1
-    dark = 1.0 + 0.3 * (1.0 / np.sqrt(reflectance) - 1.0)
+    n = surfaces.reflectance.shape[0] - 1
+    dark = 1.0 + 0.3 * (1.0 / np.sqrt(surfaces.reflectance) - 1.0)
     out = np.full((h, w), np.nan, np.float32)
     seen = ids.copy()
     for v in range(h):
@@ -136,66 +247,54 @@ def time_of_flight(depth, ids, cosine, drift, ripple, reflectance, glass, shift,
             z = np.float64(depth[v, u])
             sv, su = v, u
             # Lateral noise only shows near edges; elsewhere the slope is inside axial noise.
-            edge = _near_edge(depth, v, u, z, edge_m)
+            edge = _near_edge(depth, v, u, z, errors.edge_m)
             if edge:
-                sv, su = _source(depth, v, u, lateral_px, rng)
+                sv, su = _source(depth, v, u, errors.lateral_px, rng)
                 z = np.float64(depth[sv, su])
                 seen[v, u] = ids[sv, su]
             chance = rng.random()
-            if not z < range_high or z < range_low or chance < random_dropout:
+            if not z < errors.range_high or z < errors.range_low or (
+                    chance < errors.random_dropout):
                 continue
             which = ids[sv, su] if ids[sv, su] >= 0 else n
-            cos = max(np.float64(cosine[sv, su]), 0.02)
+            cos = max(np.float64(clean.cosine[sv, su]), LEAST_COSINE)
             # Light falls with the square of the distance and towards the image's corners.
-            eccentric = ((u - 0.5 * w) ** 2 + (v - 0.5 * h) ** 2) / (fx * fx)
-            signal = reflectance[which] * cos / (z * z * (1.0 + eccentric))
-            if signal < 8.0 * signal_floor and chance < random_dropout + math.exp(
-                    -signal / signal_floor) * (1.0 - random_dropout):
+            eccentric = ((u - 0.5 * w) ** 2 + (v - 0.5 * h) ** 2) / (clean.fx * clean.fx)
+            signal = surfaces.reflectance[which] * cos / (z * z * (1.0 + eccentric))
+            floor = errors.signal_floor
+            if signal < 8.0 * floor and chance < errors.random_dropout + math.exp(
+                    -signal / floor) * (1.0 - errors.random_dropout):
                 continue
-            theta = math.acos(min(cos, 1.0))
-            # Fankhauser et al. 2015, millimetres for z in metres.
-            sigma = 1.5 - 0.5 * z + 0.3 * z * z + 0.1 * z * math.sqrt(z) * (
-                theta / (0.5 * math.pi - theta + 0.02)) ** 2
-            sigma = 1e-3 * min(sigma, 15.0) * dark[which] * (1.0 + 0.8 * eccentric)
-            if glass[which]:
-                if rng.random() < glass_dropout:
+            sigma = _axial_noise_v2(z, cos) * dark[which] * (1.0 + 0.8 * eccentric)
+            if surfaces.glass[which]:
+                if rng.random() < errors.glass_dropout:
                     continue
                 sigma *= 2.0
-                far = shift[which] + ripple[sv, su]
-                if has_behind and behind[sv, su] < np.inf:
-                    far = min(far, max(np.float64(behind[sv, su]) - z, 0.0))
-                z += max(far, 0.0)
+                z = _through_glass(clean, surfaces, which, sv, su, z)
             elif edge:
-                other = np.float64(_edge_partner(depth, sv, su, depth[sv, su], edge_m))
+                other = np.float64(_edge_partner(depth, sv, su, depth[sv, su], errors.edge_m))
                 if other != depth[sv, su]:
-                    q = rng.random()
-                    if q < edge_dropout:
+                    z = _flying(z, other, errors, rng)
+                    if z != z:
                         continue
-                    if q < edge_dropout + flying:
-                        # The nearer surface sends more light back: weights lean towards it.
-                        a = rng.random() ** 2
-                        z += a * (other - z) if other > z else (1.0 - a) * (other - z) * 0.5
-            z += drift[v, u] + noise_scale * sigma * rng.standard_normal()
-            if quantum_m > 0:
-                z = quantum_m * math.floor(z / quantum_m + 0.5)
-            out[v, u] = z
+            z += surfaces.drift[v, u] + errors.noise_scale * sigma * rng.standard_normal()
+            out[v, u] = _quantised(z, errors.quantum_m)
     return out, seen
 
 
 @nb.njit(cache=True)
-def structured_light(depth, ids, cosine, drift, ripple, reflectance, glass, shift, behind,
-                     has_behind, rng, fx, noise_scale, lateral_px, edge_m, flying, edge_dropout,
-                     random_dropout, signal_floor, range_low, range_high, glass_dropout,
-                     quantum_m):
+def structured_light(clean: Clean, surfaces: Surfaces, errors: Errors,
+                     rng: np.random.Generator) -> tuple[Float32Array, Int32Array]:
     """
-    Return (depth float32 with NaN, ids int32) of a Kinect v1; arguments as in `sense`.
+    Return (depth float32 with NaN, ids int32) of a Kinect v1, see `sensor.sense`.
 
     Readings are steps of disparity (2.85 mm at 1 m, growing with z squared), and the
     projector, 75 mm to the right of the camera, casts a shadow left of every object.
     """
+    depth, ids = clean.depth, clean.ids
     h, w = depth.shape
-    n = reflectance.shape[0] - 1
-    baseline_px = 0.075 * fx
+    n = surfaces.reflectance.shape[0] - 1
+    baseline_px = BASELINE_M * clean.fx
     out = np.full((h, w), np.nan, np.float32)
     seen = ids.copy()
     for v in range(h):
@@ -207,33 +306,27 @@ def structured_light(depth, ids, cosine, drift, ripple, reflectance, glass, shif
                 at = u - baseline_px / z0
                 shadow = lit_from < at - 0.5
                 lit_from = min(lit_from, at)
-            sv, su = _source(depth, v, u, lateral_px, rng)
+            sv, su = _source(depth, v, u, errors.lateral_px, rng)
             z = np.float64(depth[sv, su])
             seen[v, u] = ids[sv, su]
-            if shadow or not z < range_high or z < range_low or rng.random() < random_dropout:
+            if shadow or not z < errors.range_high or z < errors.range_low or (
+                    rng.random() < errors.random_dropout):
                 continue
             which = ids[sv, su] if ids[sv, su] >= 0 else n
-            cos = np.float64(cosine[sv, su])
+            cos = np.float64(clean.cosine[sv, su])
             if cos < 0.12 + 0.05 * rng.random():
                 continue
-            if glass[which]:
-                if rng.random() < glass_dropout:
+            if surfaces.glass[which]:
+                if rng.random() < errors.glass_dropout:
                     continue
-                far = shift[which] + ripple[sv, su]
-                if has_behind and behind[sv, su] < np.inf:
-                    far = min(far, max(np.float64(behind[sv, su]) - z, 0.0))
-                z += max(far, 0.0)
-            elif _edge_partner(depth, sv, su, depth[sv, su], edge_m) != depth[sv, su]:
-                if rng.random() < edge_dropout:
+                z = _through_glass(clean, surfaces, which, sv, su, z)
+            elif _edge_partner(depth, sv, su, depth[sv, su], errors.edge_m) != depth[sv, su]:
+                if rng.random() < errors.edge_dropout:
                     continue
-            # Nguyen et al. 2012.
-            theta = math.acos(min(max(cos, 0.02), 1.0))
-            sigma = 0.0012 + 0.0019 * (z - 0.4) ** 2 + 0.0001 / math.sqrt(z) * (
-                theta / (0.5 * math.pi - theta + 0.02)) ** 2
-            z += drift[v, u] + 0.6 * noise_scale * min(sigma, 0.03) * rng.standard_normal()
-            step = 0.00285
+            sigma = _axial_noise_v1(z, cos)
+            z += surfaces.drift[v, u] + 0.6 * errors.noise_scale * min(
+                sigma, 0.03) * rng.standard_normal()
+            step = DISPARITY_STEP
             z = 1.0 / (step * max(math.floor(1.0 / (step * max(z, 0.1)) + 0.5), 1.0))
-            if quantum_m > 0:
-                z = quantum_m * math.floor(z / quantum_m + 0.5)
-            out[v, u] = z
+            out[v, u] = _quantised(z, errors.quantum_m)
     return out, seen

@@ -4,38 +4,46 @@
 Fitting of decision forests to feature tables.
 
 Features are quantised once to at most 64 levels at their quantiles; trees grow by
-information gain over a random subset of features a node (scikit-learn's random forest is the
-reference in the tests, an order of magnitude slower on this many classes and features).
+information gain over a random subset of features per node. scikit-learn's random forest is the
+reference in the tests; it is ten times slower with this many classes and features.
 """
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import cast, TypeAlias
 
+from hooc_perception.core.arrays import AnyArray, Float32Array, UInt8Array
 from hooc_perception.core.classification.forest import Forest, quantised
 from hooc_perception.core.config import Config, param
-from hooc_perception.training import fit_kernels
+from hooc_perception.training.kernels import table_tree
+from hooc_perception.training.kernels.splits import Limits
+from hooc_perception.training.kernels.table_tree import Table
 from joblib import delayed, Parallel
 import numpy as np
+
+# Of one tree: feature, threshold, left of its nodes, and leaf_p of its leaves, see Forest.
+Tree: TypeAlias = tuple[AnyArray, Float32Array, AnyArray, UInt8Array]
 
 
 @dataclass(frozen=True)
 class FitConfig(Config):
     """Parameters of forest growth."""
 
-    trees: int = param(40, 'Trees of the forest.', '', 1, 1000)
+    trees: int = param(40, 'Trees in the forest.', '', 1, 1000)
     features_per_node: int = param(80, 'Features drawn at random at each node.', '', 1, 10000)
-    node_samples: int = param(6000, 'Most samples that rank the features of a node; all are '
-                              'then split.', '', 10, 100000000)
+    node_samples: int = param(6000, 'Most samples that rank the features of a node; all samples '
+                              'are then split.', '', 10, 100000000)
     max_depth: int = param(26, 'Deepest split.', '', 1, 60)
     min_leaf: int = param(10, 'Fewest training samples in a leaf.', '', 1, 10000)
     min_gain_bits: float = param(0.005, 'Least information gain of a split.', 'bit', 0.0, 1.0)
     bins: int = param(64, 'Quantisation levels of a feature.', '', 2, 255)
-    prior: float = param(0.3, "Share of a leaf's mass, in samples, that is spread as in the "
+    prior: float = param(0.3, 'Samples added to every leaf with the class distribution of the '
                          'whole training set, so that no class is ever impossible.', '', 0.0, 100)
     sample_share: float = param(0.6, 'Share of the samples, without replacement, that grows a '
-                                'tree; all of them fill its leaves.', '', 0.01, 1.0)
+                                'tree; all samples fill its leaves.', '', 0.01, 1.0)
 
 
-def thresholds(x, bins, rng):
+def thresholds(x: Float32Array, bins: int, rng: np.random.Generator) -> Float32Array:
     """
     Return (F, bins - 1) float32 ascending split values at the quantiles of x (n, F).
 
@@ -50,7 +58,7 @@ def thresholds(x, bins, rng):
     return out
 
 
-def quantise(x, cuts):
+def quantise(x: Float32Array, cuts: Float32Array) -> UInt8Array:
     """Return (F, n) uint8: the number of cuts (F, B) that are < each value of x (n, F)."""
     out = np.empty((x.shape[1], len(x)), np.uint8)
     for f in range(x.shape[1]):
@@ -58,27 +66,30 @@ def quantise(x, cuts):
     return out
 
 
-def fit(binned, y, n_classes, cuts, config, rng, n_jobs=1, progress=None):
+def fit(binned: UInt8Array, y: UInt8Array, n_classes: int, cuts: Float32Array,
+        config: FitConfig, rng: np.random.Generator, n_jobs: int = 1,
+        progress: Callable[[int], object] | None = None) -> Forest:
     """
     Return a Forest fitted to quantised features.
 
     :param binned: (F, n) uint8 from `quantise`; y (n,) uint8 classes.
     :param cuts: (F, B) float32 split values; bin b means value <= cuts[b].
-    :param rng: the same generator state gives the same forest whatever `n_jobs` is.
+    :param rng: the same generator state gives the same forest for any `n_jobs`.
     :param progress: called with 1 after every tree.
     """
     n = len(y)
     prior = np.bincount(y, minlength=n_classes) / n
     m = max(1, int(round(config.sample_share * n)))
     seeds = rng.integers(1 << 31, size=(config.trees, 2))
+    table = Table(binned, y, n_classes, config.bins)
+    limits = Limits(config.node_samples, config.max_depth, config.min_leaf,
+                    config.min_gain_bits)
 
-    def one(order_seed, node_seed):
+    def one(order_seed: int, node_seed: int) -> Tree:
         order = np.random.default_rng(order_seed).permutation(n)[:m].astype(np.int32)
-        feature, split, left = fit_kernels.grow_tree(
-            binned, y, np.sort(order), n_classes, config.bins, config.features_per_node,
-            config.node_samples, config.max_depth, config.min_leaf, config.min_gain_bits,
-            int(node_seed))
-        end = fit_kernels.walk_binned(binned, feature, split, left)
+        feature, split, left = table_tree.grow_tree(
+            table, np.sort(order), config.features_per_node, limits, int(node_seed))
+        end = table_tree.walk_binned(binned, feature, split, left)
         threshold = np.zeros(len(feature), np.float32)
         inner = feature >= 0
         threshold[inner] = cuts[feature[inner], split[inner]]
@@ -88,10 +99,11 @@ def fit(binned, y, n_classes, cuts, config, rng, n_jobs=1, progress=None):
             progress(1)
         return feature, threshold, left, quantised(counts)
 
-    return joined(Parallel(n_jobs=n_jobs, require='sharedmem')(delayed(one)(*s) for s in seeds))
+    trees = Parallel(n_jobs=n_jobs, require='sharedmem')(delayed(one)(*s) for s in seeds)
+    return joined(cast(list[Tree], trees))
 
 
-def joined(trees):
+def joined(trees: Sequence[Tree]) -> Forest:
     """Return the Forest of (feature, threshold, left, leaf_p) trees, leaves in node order."""
     nodes = np.cumsum([0, *(len(t[0]) for t in trees)])
     feature = np.concatenate([t[0] for t in trees])

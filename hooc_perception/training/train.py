@@ -3,36 +3,93 @@
 """
 `hooc train`: from generic meshes and cameras to a MODEL folder, without looking at a scene.
 
-What a profile learns is data in PROFILES. Each step is a function of the TrainingContext that
-returns arrays which are stored with the classifier, and may read those of the steps before.
+PROFILES lists what each profile learns. Each step is a function of the TrainingContext: it
+returns arrays, which are stored with the classifier, and may read those of the earlier steps.
 """
 
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 import json
 from pathlib import Path
+from typing import Any, Protocol, TypeAlias, TypeVar
 
+from hooc_perception.core.arrays import BoolArray
 from hooc_perception.core.classification.classify import FORMAT_VERSION, KIND_FUSED, KIND_PAPER
+from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.config import Config
 from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.profiles import profile as profile_of
+from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.objects.derive import derive
 from hooc_perception.objects.mesh import load_mesh
 from hooc_perception.synthesis.training_scenes import PAPER, training_scenes
-from hooc_perception.trained.folder import check_place, save_model_folder
+from hooc_perception.trained.folder import check_place, ModelFolder, save_model_folder
 from hooc_perception.training import fit_pixels
 from hooc_perception.training.fit_forest import fit, FitConfig
 from hooc_perception.training.fit_verifier import fit_verifier, VerifierConfig
-from hooc_perception.training.fused_scenes import fused_table, FusedScenesConfig
+from hooc_perception.training.fused_scenes import fused_table, FusedScenesConfig, FusedTable
 import joblib
 import numpy as np
 from tqdm import tqdm
 
-PROFILES = {
+T = TypeVar('T')
+# Arrays and numpy scalars by name, as a MODEL folder stores them.
+Arrays: TypeAlias = dict[str, Any]
+PROFILES: dict[str, tuple[Config, ...]] = {
     'paper': (fit_pixels.PixelFitConfig(),),
     'best': (FusedScenesConfig(), FitConfig(), VerifierConfig()),
     'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24),
              VerifierConfig(verifier_scenes=30)),
 }
+
+
+class TrainedCategory(Protocol):
+    """What training reads of a category, as io.scenes.scene.Category has it."""
+
+    @property
+    def name(self) -> str:
+        """Return the name of the class."""
+        ...
+
+    @property
+    def mesh_path(self) -> Path:
+        """Return the file of the generic mesh."""
+        ...
+
+    @property
+    def scale(self) -> float:
+        """Return the factor from units of the mesh to metres."""
+        ...
+
+
+class TrainingSet(Protocol):
+    """What training reads of a set, as io.scenes.scene_set.SceneSet has it; never its scenes."""
+
+    @property
+    def name(self) -> str:
+        """Return the name of the set."""
+        ...
+
+    @property
+    def path(self) -> Path:
+        """Return the folder of the set."""
+        ...
+
+    @property
+    def categories(self) -> Sequence[TrainedCategory]:
+        """Return the categories in class order."""
+        ...
+
+    @property
+    def cameras(self) -> Sequence[Camera]:
+        """Return the cameras of the rig."""
+        ...
+
+    @property
+    def max_instances(self) -> int:
+        """Return the most objects of one category per scene, 0 = no limit."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -43,33 +100,34 @@ class TrainingContext:
     :ivar models: tuple of GenericModel; class id c is models[c - 1].
     :ivar cameras: tuple of Camera of the set; `max_instances` as in SceneSet.
     :ivar configs: the Config objects of the profile; `jobs` worker processes or threads.
-    :ivar classifier: arrays of the steps before.
+    :ivar classifier: arrays of the earlier steps.
     """
 
-    models: tuple
-    cameras: tuple
+    models: tuple[GenericModel, ...]
+    cameras: tuple[Camera, ...]
     max_instances: int
     profile: str
     seed: int
-    configs: tuple
+    configs: tuple[Config, ...]
     jobs: int
     progress: bool
-    classifier: dict
+    classifier: Arrays
 
-    def bar(self, total, what, unit):
+    def bar(self, total: int, what: str, unit: str) -> tqdm:
         """Return a progress bar; call its `update(n)`."""
         return tqdm(total=total, desc=what, unit=unit, disable=not self.progress)
 
 
-def train(scene_set, out, profile='best', seed=0, progress=True, configs=None, jobs=0):
+def train(scene_set: TrainingSet, out: str | Path, profile: str = 'best', seed: int = 0,
+          progress: bool = True, configs: Sequence[Config] | None = None,
+          jobs: int = 0) -> ModelFolder:
     """
     Train a model from a set's generic meshes and cameras, and write it as a MODEL folder.
 
-    :param scene_set: SceneSet; its scenes are never read.
+    :param scene_set: its scenes are never read.
     :param out: folder to write.
     :param configs: Config objects instead of the profile's own, for tests and experiments.
     :param jobs: parallel workers, 0 = all cores; the result does not depend on it.
-    :return: the ModelFolder.
     :raises HoocError: no categories, no cameras, an unknown profile, or an unreadable mesh.
     """
     if profile not in PROFILES:
@@ -86,8 +144,9 @@ def train(scene_set, out, profile='best', seed=0, progress=True, configs=None, j
                              scene_set.cameras, scene_set.max_instances)
 
 
-def generic_models(scene_set, seed, progress=False):
-    """Return the tuple of GenericModel of a set's categories, in class order."""
+def generic_models(scene_set: TrainingSet, seed: int,
+                   progress: bool = False) -> tuple[GenericModel, ...]:
+    """Return the generic models of a set's categories, in class order."""
     models = []
     for index, category in enumerate(tqdm(scene_set.categories, desc='generic models',
                                           unit='model', disable=not progress)):
@@ -96,8 +155,10 @@ def generic_models(scene_set, seed, progress=False):
     return tuple(models)
 
 
-def train_classifier(models, cameras, profile='best', seed=0, max_instances=0, configs=None,
-                     jobs=0, progress=False):
+def train_classifier(models: Sequence[GenericModel], cameras: Sequence[Camera],
+                     profile: str = 'best', seed: int = 0, max_instances: int = 0,
+                     configs: Sequence[Config] | None = None, jobs: int = 0,
+                     progress: bool = False) -> Arrays:
     """Return the classifier's dict of arrays, from a step for each of the configs."""
     configs = tuple(configs or PROFILES[profile])
     context = TrainingContext(tuple(models), tuple(cameras), max_instances, profile, seed,
@@ -108,43 +169,44 @@ def train_classifier(models, cameras, profile='best', seed=0, max_instances=0, c
     return dict(context.classifier)
 
 
-def _head(context, kind, held_out):
-    """Return the arrays that say what a classifier is and how it came about."""
-    settings = {type(c).__name__: {k: asdict(v) if isinstance(v, Config) else v
-                                   for k, v in vars(c).items()} for c in context.configs}
-    settings.update(profile=context.profile, seed=context.seed, **held_out)
+def _head(context: TrainingContext, kind: int,
+          held_out: dict[str, float | None]) -> Arrays:
+    """Return the arrays that describe a classifier and how it was trained."""
+    settings = {**{type(c).__name__: asdict(c) for c in context.configs},
+                'profile': context.profile, 'seed': context.seed, **held_out}
     return {'kind': np.uint8(kind), 'version': np.uint8(FORMAT_VERSION),
             'classes': np.uint8(len(context.models)),
             'settings': np.array(json.dumps(settings, sort_keys=True))}
 
 
-def _paper(context, config):
-    """Learn one multi-view forest a view (METHOD 1.1 and 1.2)."""
+def _paper(context: TrainingContext, config: fit_pixels.PixelFitConfig) -> Arrays:
+    """Learn one multi-view forest per view (Basevi & Leonardis 2016, section 4)."""
     n_classes = len(context.models) + 1
-    pools = []
-    for stage, n, pixels in (
-            ('structure', config.structure_scenes, config.structure_pixels),
-            ('leaves', config.leaf_scenes, config.leaf_pixels)):
+
+    def pool(stage: str, n: int, pixels: int) -> fit_pixels.PixelPool:
         scenes = training_scenes(context.models, context.cameras, PAPER, context.seed, n,
                                  stage=stage, jobs=context.jobs)
         with context.bar(n, f'scenes for {stage}', 'scene') as bar:
-            pools.append(fit_pixels.pool(_counted(scenes, bar), n, pixels, config, context.seed,
-                                         stage))
-    arrays = {'views': np.uint8(len(context.cameras))}
+            return fit_pixels.pool(_counted(scenes, bar), n, pixels, config, context.seed, stage)
+
+    structure = pool('structure', config.structure_scenes, config.structure_pixels)
+    leaves = pool('leaves', config.leaf_scenes, config.leaf_pixels)
+    arrays: Arrays = {'views': np.uint8(len(context.cameras))}
     with context.bar(config.trees * len(context.cameras), 'trees', 'tree') as bar:
         for view in range(len(context.cameras)):
-            forest = fit_pixels.fit_view(*pools, view, n_classes, config, context.seed,
-                                         context.jobs, bar.update)
+            forest = fit_pixels.fit_view(structure, leaves, view, n_classes, config,
+                                         context.seed, context.jobs, bar.update)
             arrays.update(forest.arrays(f'view{view}_'))
     return {**_head(context, KIND_PAPER, {}), **arrays}
 
 
-def _fused(context, scenes):
-    """Learn one forest over fused features, and how well it does on scenes it never saw."""
+def _fused(context: TrainingContext, scenes: FusedScenesConfig) -> Arrays:
+    """Learn one forest over fused features, and its accuracy on scenes that are held out."""
     forest_config = next(c for c in context.configs if isinstance(c, FitConfig))
     with context.bar(scenes.scenes, 'synthetic scenes', 'scene') as bar:
         table = fused_table(context.models, context.cameras, scenes, context.seed,
-                            context.max_instances, context.jobs, bar.update)
+                            context.max_instances, context.jobs, bar.update,
+                            profile_of(context.profile).observe)
     kept = table.scene < scenes.scenes - max(1, scenes.scenes // 25)
     with context.bar(forest_config.trees, 'trees', 'tree') as bar:
         forest = fit(np.ascontiguousarray(table.binned[:, kept]), table.y[kept],
@@ -155,7 +217,7 @@ def _fused(context, scenes):
             **forest.arrays('forest_')}
 
 
-def _accuracy(forest, table, rows):
+def _accuracy(forest: Forest, table: FusedTable, rows: BoolArray) -> float | None:
     """Return the share of held-out object pixels whose class is the most likely one."""
     rows &= table.y > 0
     if not rows.any():
@@ -166,7 +228,7 @@ def _accuracy(forest, table, rows):
     return round(float((forest.predict(x).argmax(1) == table.y[rows]).mean()), 4)
 
 
-def _counted(items, bar):
+def _counted(items: Iterable[T], bar: tqdm) -> Iterator[T]:
     """Yield the items and advance a progress bar."""
     for item in items:
         yield item
@@ -174,5 +236,6 @@ def _counted(items, bar):
 
 
 # What is learned, by the type of the Config that describes it; in the order of the configs.
-STEPS = {fit_pixels.PixelFitConfig: _paper, FusedScenesConfig: _fused,
-         VerifierConfig: fit_verifier}
+STEPS: dict[type[Config], Callable[[TrainingContext, Any], Arrays]] = {
+    fit_pixels.PixelFitConfig: _paper, FusedScenesConfig: _fused,
+    VerifierConfig: fit_verifier}

@@ -66,7 +66,7 @@ def test_grazing_surfaces_are_noisier(camera):
 def test_incidence_is_that_of_the_plane(camera):
     for angle in (0.0, 0.6, 1.1):
         depth = tilted(camera, angle)
-        got = sensor_kernels.incidence(depth, 366.0, 366.0, 255.5, 211.5, 0.03)
+        got = sensor_kernels.incidence(depth, 366.0, 366.0, 255.5, 211.5)
         ray = rays(camera.K, 424, 512)
         normal = np.array([0, np.sin(angle), np.cos(angle)])
         expected = np.abs(ray @ normal) / np.linalg.norm(ray, axis=-1)

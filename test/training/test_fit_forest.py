@@ -4,8 +4,9 @@
 
 from dataclasses import replace
 
-from hooc_perception.training import fit_kernels
 from hooc_perception.training.fit_forest import fit, FitConfig, quantise, thresholds
+from hooc_perception.training.kernels.splits import best_split, Limits, x_log_x
+from hooc_perception.training.kernels.table_tree import grow_tree, Table, walk_binned
 import numpy as np
 import pytest
 from scipy.stats import entropy
@@ -34,8 +35,8 @@ def test_best_split_is_the_best_of_all(n):
     rng = np.random.default_rng(n)
     y = rng.integers(0, 6, n).astype(np.uint8)
     values = np.clip(rng.normal(10 + 2 * y, 6), 0, 63).astype(np.uint8)
-    got, split = fit_kernels.best_split(
-        values, y, np.bincount(y, minlength=6), 64, fit_kernels.x_log_x(n), 5,
+    got, split = best_split(
+        values, y, np.bincount(y, minlength=6), 64, x_log_x(n), 5,
         np.zeros((64, 6), np.int32), np.zeros(64, np.int32))
     allowed = [b for b in range(63) if min((values <= b).sum(), (values > b).sum()) >= 5]
     gains = [gain(y, values <= b, 6) for b in allowed]
@@ -45,8 +46,8 @@ def test_best_split_is_the_best_of_all(n):
 
 def test_no_split_where_none_leaves_enough():
     y = np.array([0, 1] * 10, np.uint8)
-    got, split = fit_kernels.best_split(
-        np.zeros(20, np.uint8), y, np.bincount(y, minlength=2), 8, fit_kernels.x_log_x(20), 1,
+    got, split = best_split(
+        np.zeros(20, np.uint8), y, np.bincount(y, minlength=2), 8, x_log_x(20), 1,
         np.zeros((8, 2), np.int32), np.zeros(8, np.int32))
     assert (got, split) == (-1.0, -1)
 
@@ -54,8 +55,9 @@ def test_no_split_where_none_leaves_enough():
 def test_a_stump_splits_as_scikit_learn_does():
     x, y = toy(4000, np.random.default_rng(0))
     cuts = thresholds(x, 255, np.random.default_rng(0))
-    feature, split, _ = fit_kernels.grow_tree(
-        quantise(x, cuts), y, np.arange(4000, dtype=np.int32), 5, 255, 12, 10**6, 1, 1, 0.0, 7)
+    feature, split, _ = grow_tree(Table(quantise(x, cuts), y, 5, 255),
+                                  np.arange(4000, dtype=np.int32), 12,
+                                  Limits(10**6, 1, 1, 0.0), 7)
     reference = DecisionTreeClassifier(criterion='entropy', max_depth=1).fit(x, y).tree_
     assert len(feature) == 3 and feature[0] == reference.feature[0]
     assert cuts[feature[0], split[0]] == pytest.approx(reference.threshold[0], abs=0.05)
@@ -115,8 +117,8 @@ def test_every_leaf_keeps_its_least_size_and_no_class_dies_out():
     x, y = toy(2000, np.random.default_rng(4))
     cuts = thresholds(x, 64, np.random.default_rng(0))
     binned = quantise(x, cuts)
-    feature, split, left = fit_kernels.grow_tree(
-        binned, y, np.arange(2000, dtype=np.int32), 5, 64, 6, 10**6, 30, 25, 0.0, 1)
-    sizes = np.bincount(fit_kernels.walk_binned(binned, feature, split, left),
+    feature, split, left = grow_tree(Table(binned, y, 5, 64), np.arange(2000, dtype=np.int32), 6,
+                                     Limits(10**6, 30, 25, 0.0), 1)
+    sizes = np.bincount(walk_binned(binned, feature, split, left),
                         minlength=len(feature))
     assert sizes[feature < 0].min() >= 25 and (sizes[feature >= 0] == 0).all()

@@ -3,18 +3,21 @@
 """
 Stage 2: class probabilities of foreground pixels.
 
-The classifier's arrays say which of two forests it holds: the paper's, one a view and bound
-to its rig, or one forest over fused features for any rig (docs/classifier.md).
+A classifier holds one of two kinds of forests: the paper's, one per view and bound to its rig,
+or one forest over fused features for any rig (docs/classifier.md).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
+from hooc_perception.core.arrays import AnyArray, Int64Array
 from hooc_perception.core.classification import features
-from hooc_perception.core.classification.forest import Forest, quantised
-from hooc_perception.core.classification.kernels import smoothing as forest_smooth
+from hooc_perception.core.classification.features import Pixels
+from hooc_perception.core.classification.forest import DAMAGED, Forest, quantised
+from hooc_perception.core.classification.kernels import smoothing
 from hooc_perception.core.classification.pixel_forest import centres, depth_stack, PixelForest
 from hooc_perception.core.config import Config, param
-from hooc_perception.core.types import PixelProbabilities
+from hooc_perception.core.types import Observation, PixelProbabilities
 from hooc_perception.errors import HoocError
 import numpy as np
 
@@ -26,33 +29,26 @@ FORMAT_VERSION = 1
 class ClassifyConfig(Config):
     """Parameters of stage 2; those of training are stored with the classifier."""
 
-    stride: int = param(2, 'The fused forest reads every n-th pixel in both directions; pixels '
-                        'between take the probabilities of neighbours at their depth.', 'px', 1, 8)
-    smoothing_steps: int = param(12, 'Steps by which probabilities spread over the surface '
-                                 "graph, over all views; 0 = none. Never used by the paper's "
-                                 'forest.', '', 0, 200)
-    smoothing_angle_rad: float = param(0.8, 'A valley of about this angle between two surface '
-                                       'points cuts the spread to 1/e.', 'rad', 0.01, 3.0)
+    stride: int = param(2, 'The fused forest classifies every n-th pixel in both directions; the '
+                        'pixels in between copy neighbours at the same depth.', 'px', 1, 8)
+    smoothing_steps: int = param(12, 'Number of steps by which probabilities are smoothed over '
+                                 "the surface graph of all views; 0 = none. The paper's forest "
+                                 'is never smoothed.', '', 0, 200)
+    smoothing_angle_rad: float = param(0.8, 'A concave edge of this angle between two surface '
+                                       'points reduces smoothing across it to 1/e.', 'rad',
+                                       0.01, 3.0)
 
 
-def classify(observation, classifier, config=ClassifyConfig()):
+def classify(observation: Observation, classifier: Mapping[str, AnyArray],
+             config: ClassifyConfig = ClassifyConfig()) -> PixelProbabilities:
     """
     Return the PixelProbabilities of every foreground pixel of an Observation.
 
-    :param classifier: dict of arrays as `hooc train` leaves it.
-    :raises HoocError: a damaged or foreign classifier, or, for the paper's, another number of
-        views than it was trained for.
+    :param classifier: arrays by name, as `hooc train` stores them.
+    :raises HoocError: if the classifier is damaged or foreign, or if the paper's classifier was
+        trained for another number of views.
     """
-    try:
-        kind, version = int(classifier['kind']), int(classifier['version'])
-        n_columns = int(classifier['classes']) + 1
-        if kind == KIND_PAPER:
-            int(classifier['views'])
-    except (KeyError, TypeError, ValueError, OverflowError) as e:
-        raise HoocError(f'the classifier is not one of ours ({e}); train the model again')
-    if version != FORMAT_VERSION or kind not in (KIND_PAPER, KIND_FUSED):
-        raise HoocError(f'the classifier has format {version}, kind {kind}; this program reads '
-                        f'format {FORMAT_VERSION}; train the model again')
+    kind, n_columns = _header(classifier)
     rows = [np.nonzero(v.foreground & np.isfinite(v.depth)) for v in observation.views]
     if not sum(len(r) for r, _ in rows):
         return PixelProbabilities(np.zeros(0, np.uint8), np.zeros((0, 2), np.uint16),
@@ -66,7 +62,23 @@ def classify(observation, classifier, config=ClassifyConfig()):
     return PixelProbabilities(pixels.camera, pixels.uv, quantised(p)[row])
 
 
-def _paper(observation, pixels, classifier, config):
+def _header(classifier: Mapping[str, AnyArray]) -> tuple[int, int]:
+    """Return (kind, number of probability columns) of a classifier; raise HoocError."""
+    try:
+        kind, version = int(classifier['kind']), int(classifier['version'])
+        n_columns = int(classifier['classes']) + 1
+        if kind == KIND_PAPER:
+            int(classifier['views'])
+    except (KeyError, TypeError, ValueError, OverflowError) as e:
+        raise HoocError(f'the classifier is not one of ours ({e}); train the model again')
+    if version != FORMAT_VERSION or kind not in (KIND_PAPER, KIND_FUSED):
+        raise HoocError(f'the classifier has format {version}, kind {kind}; this program reads '
+                        f'format {FORMAT_VERSION}; train the model again')
+    return kind, n_columns
+
+
+def _paper(observation: Observation, pixels: Pixels, classifier: Mapping[str, AnyArray],
+           config: ClassifyConfig) -> tuple[AnyArray, Int64Array]:
     """Return (n, C) probabilities by the forest of each pixel's own view, and arange(n)."""
     views = observation.views
     trained = int(classifier['views'])
@@ -82,18 +94,19 @@ def _paper(observation, pixels, classifier, config):
     return np.concatenate(parts), np.arange(len(pixels.camera))
 
 
-def _fused(observation, pixels, classifier, config):
-    """Return (k, C) probabilities by the one forest, and the row (n,) that is each pixel's."""
+def _fused(observation: Observation, pixels: Pixels, classifier: Mapping[str, AnyArray],
+           config: ClassifyConfig) -> tuple[AnyArray, AnyArray]:
+    """Return (k, C) probabilities by the fused forest, and the row (n,) of each pixel in them."""
     forest = Forest.from_arrays(classifier, 'forest_')
     probes = np.ascontiguousarray(classifier['probes'], np.float64)
     if probes.ndim != 2 or probes.shape[1] != 5 or (
             forest.feature.max(initial=-1) >= features.feature_count(len(probes))):
-        raise HoocError('the classifier holds a damaged forest; train the model again')
+        raise HoocError(DAMAGED)
     around = features.surroundings(observation, pixels)
-    rows, donor = forest_smooth.thin(pixels.camera, pixels.uv, pixels.points, config.stride)
+    rows, donor = smoothing.thin(pixels.camera, pixels.uv, pixels.points, config.stride)
     p = forest.predict(features.pixel_features(pixels, around, probes, rows))
     if config.smoothing_steps:
-        p = forest_smooth.spread(
+        p = smoothing.spread(
             p, around.voxel[rows], len(around.voxel_points), around.pairs,
             np.exp(-(around.weight / config.smoothing_angle_rad) ** 2), config.smoothing_steps)
         return p, around.voxel

@@ -2,11 +2,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """A decision forest as plain arrays: what a MODEL folder stores and inference reads."""
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass
 
-from hooc_perception.core.classification.kernels import walk as forest_walk
+from hooc_perception.core.arrays import (
+    AnyArray,
+    Float32Array,
+    Int32Array,
+    Int64Array,
+    UInt8Array,
+)
+from hooc_perception.core.classification.kernels import walk
+from hooc_perception.core.classification.kernels.walk import Leaves, Nodes
 from hooc_perception.errors import HoocError
 import numpy as np
+from numpy.typing import ArrayLike
+
+DAMAGED = 'the classifier holds a damaged forest; train the model again'
 
 
 @dataclass(frozen=True)
@@ -22,66 +34,84 @@ class Forest:
     :ivar leaf_p: (L, C) uint8 class distribution of a leaf, probability x 255.
     """
 
-    feature: np.ndarray
-    threshold: np.ndarray
-    left: np.ndarray
-    roots: np.ndarray
-    leaf: np.ndarray
-    leaf_p: np.ndarray
+    feature: Int32Array
+    threshold: Float32Array
+    left: Int32Array
+    roots: Int32Array
+    leaf: Int32Array
+    leaf_p: UInt8Array
 
-    def leaves(self, x):
+    @property
+    def nodes(self) -> Nodes:
+        """Return the node table as kernels take it."""
+        return Nodes(self.feature, self.threshold, self.left)
+
+    @property
+    def distributions(self) -> Leaves:
+        """Return the class distributions of the leaves as kernels take them."""
+        return Leaves(self.leaf, self.leaf_p)
+
+    def leaves(self, x: AnyArray) -> Int32Array:
         """Return (n, T) int32: the node in which each row of x (n, F) float32 ends."""
         x = np.ascontiguousarray(x, np.float32)
         out = np.empty((len(self.roots), len(x)), np.int32)
         for t, root in enumerate(self.roots):
-            forest_walk.walk_tree(x, self.feature, self.threshold, self.left, root, out[t])
+            walk.walk_tree(x, self.nodes, root, out[t])
         return out.T
 
-    def predict(self, x):
+    def predict(self, x: AnyArray) -> Float32Array:
         """Return (n, C) float32 class probabilities of feature rows x (n, F) float32."""
-        return forest_walk.predict(np.ascontiguousarray(x, np.float32), self.feature,
-                                   self.threshold, self.left, self.roots, self.leaf, self.leaf_p)
+        return walk.predict(np.ascontiguousarray(x, np.float32), self.nodes, self.roots,
+                            self.distributions)
 
-    def arrays(self, prefix=''):
+    def arrays(self, prefix: str = '') -> dict[str, AnyArray]:
         """Return the arrays as a dict whose keys start with `prefix`."""
-        return {prefix + f.name: getattr(self, f.name) for f in fields(self)}
+        return {prefix + 'feature': self.feature, prefix + 'threshold': self.threshold,
+                prefix + 'left': self.left, prefix + 'roots': self.roots,
+                prefix + 'leaf': self.leaf, prefix + 'leaf_p': self.leaf_p}
 
     @staticmethod
-    def from_arrays(arrays, prefix=''):
+    def from_arrays(arrays: Mapping[str, AnyArray], prefix: str = '') -> 'Forest':
         """
         Return the Forest stored under `prefix` in a dict of arrays.
 
-        :raises HoocError: where arrays are missing or point outside of one another, so that
-            a damaged model can never read foreign memory.
+        :raises HoocError: if arrays are missing or point outside of one another, so that a
+            damaged model can never read foreign memory.
         """
         try:
-            forest = Forest(*(np.ascontiguousarray(arrays[prefix + f.name], dtype)
-                              for f, dtype in zip(fields(Forest), (
-                                  np.int32, np.float32, np.int32, np.int32, np.int32, np.uint8))))
+            forest = Forest(np.ascontiguousarray(arrays[prefix + 'feature'], np.int32),
+                            np.ascontiguousarray(arrays[prefix + 'threshold'], np.float32),
+                            np.ascontiguousarray(arrays[prefix + 'left'], np.int32),
+                            np.ascontiguousarray(arrays[prefix + 'roots'], np.int32),
+                            np.ascontiguousarray(arrays[prefix + 'leaf'], np.int32),
+                            np.ascontiguousarray(arrays[prefix + 'leaf_p'], np.uint8))
         except KeyError as missing:
             raise HoocError(f'the classifier has no array {missing}; train the model again')
         except (ValueError, TypeError):
-            raise HoocError('the classifier holds texts for numbers; train the model again')
-        n = forest.feature.size
-        rows = forest.feature, forest.threshold, forest.left, forest.leaf
-        if any(row.shape != (n,) for row in rows) or forest.roots.ndim != 1:
-            raise HoocError('the classifier holds a damaged forest; train the model again')
-        inner = forest.feature >= 0
-        children = forest.left[inner]
-        ok = (forest.leaf_p.ndim == 2 and len(forest.roots) > 0
-              and _within(forest.roots, n) and _within(forest.leaf[~inner], len(forest.leaf_p))
-              and (children > np.nonzero(inner)[0]).all() and _within(children + 1, n))
-        if not ok:
-            raise HoocError('the classifier holds a damaged forest; train the model again')
+            raise HoocError('the classifier holds text instead of numbers; train the model again')
+        if not forest._is_sound():
+            raise HoocError(DAMAGED)
         return forest
 
+    def _is_sound(self) -> bool:
+        """Return whether no index of the arrays points outside of another one."""
+        n = self.feature.size
+        rows = self.feature, self.threshold, self.left, self.leaf
+        if any(row.shape != (n,) for row in rows) or self.roots.ndim != 1:
+            return False
+        inner = self.feature >= 0
+        children = self.left[inner]
+        return (self.leaf_p.ndim == 2 and len(self.roots) > 0
+                and _within(self.roots, n) and _within(self.leaf[~inner], len(self.leaf_p))
+                and bool((children > np.nonzero(inner)[0]).all()) and _within(children + 1, n))
 
-def _within(index, size):
+
+def _within(index: Int32Array | Int64Array, size: int) -> bool:
     """Return whether every entry of an integer array lies in [0, size)."""
     return bool(((index >= 0) & (index < size)).all())
 
 
-def quantised(p):
+def quantised(p: ArrayLike) -> UInt8Array:
     """Return uint8 rows of probabilities (n, C) x 255, rounded so that each row sums to 255."""
     scaled = np.asarray(p, np.float64) * 255 / np.maximum(np.sum(p, 1, keepdims=True), 1e-12)
     low = np.floor(scaled)

@@ -1,19 +1,27 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The paper's multi-view decision forest: one a view, tests in all views (METHOD 1.2).
+The paper's multi-view decision forest: one per view, with tests in all views.
 
-The pixel's 3D point is projected into every view; there it is the centre of a bounding
-region whose size falls with its depth in that view. A test compares the depths at two offsets
-in one region, or at one offset and the centre (Basevi & Leonardis 2016, section 4, after
-Brachmann et al. 2014). Depths are whole millimetres, so that results are exact everywhere.
+Basevi & Leonardis 2016, section 4, after Brachmann et al. 2014. The pixel's 3D point is projected
+into every view; there it is the centre of a bounding region whose size falls with its depth in
+that view. A test compares the depths at two offsets in one region, or at one offset and the
+centre. Depths are whole millimetres, so that results are exact everywhere.
 """
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from hooc_perception.core.classification.forest import Forest
-from hooc_perception.core.classification.kernels import pixel_forest as forest_pixels
+from hooc_perception.core.arrays import (
+    AnyArray,
+    Float32Array,
+    UInt8Array,
+    UInt16Array,
+)
+from hooc_perception.core.classification.forest import DAMAGED, Forest
+from hooc_perception.core.classification.kernels import pixel_forest as kernels
 from hooc_perception.core.geometry import inverse
+from hooc_perception.core.types import ObservedView
 from hooc_perception.errors import HoocError
 import numpy as np
 
@@ -32,28 +40,29 @@ class PixelForest:
     """
 
     forest: Forest
-    test_view: np.ndarray
-    offsets: np.ndarray
+    test_view: UInt8Array
+    offsets: Float32Array
 
-    def predict(self, images, centre):
+    def predict(self, images: UInt16Array, centre: Float32Array) -> Float32Array:
         """
         Return (n, C) float32 probabilities of pixels.
 
         :param images: (V, H, W) uint16 from `depth_stack`; centre (n, V, 3) from `centres`.
         """
-        f = self.forest
-        return forest_pixels.predict_pixels(
-            images[None], np.zeros(len(centre), np.int32), centre, self.test_view, self.offsets,
-            f.feature, f.threshold, f.left, f.roots, FAR_MM, f.leaf, f.leaf_p)
+        return kernels.predict_pixels(
+            kernels.Samples(images[None], np.zeros(len(centre), np.int32), centre),
+            kernels.DepthTests(self.test_view, self.offsets, FAR_MM), self.forest.nodes,
+            self.forest.roots, self.forest.distributions)
 
-    def arrays(self, prefix):
+    def arrays(self, prefix: str) -> dict[str, AnyArray]:
         """Return the arrays as a dict whose keys start with `prefix`."""
         return {**self.forest.arrays(prefix), prefix + 'test_view': self.test_view,
                 prefix + 'offsets': self.offsets}
 
     @staticmethod
-    def from_arrays(arrays, prefix, n_views):
-        """Return the PixelForest stored under `prefix`; HoocError where it is damaged."""
+    def from_arrays(arrays: Mapping[str, AnyArray], prefix: str,
+                    n_views: int) -> 'PixelForest':
+        """Return the PixelForest stored under `prefix`; raise HoocError if it is damaged."""
         forest = Forest.from_arrays(arrays, prefix)
         try:
             view = np.ascontiguousarray(arrays[prefix + 'test_view'], np.uint8)
@@ -63,13 +72,13 @@ class PixelForest:
         tests = len(view)
         if (offsets.shape != (tests, 4) or not np.isfinite(offsets).all()
                 or forest.feature.max(initial=-1) >= tests or (view >= n_views).any()):
-            raise HoocError('the classifier holds a damaged forest; train the model again')
+            raise HoocError(DAMAGED)
         return PixelForest(forest, view, offsets)
 
 
-def depth_stack(views):
+def depth_stack(views: Sequence[ObservedView]) -> UInt16Array:
     """
-    Return (V, H, W) uint16 depth in mm of ObservedViews, for `walk_pixels`.
+    Return (V, H, W) uint16 depth in mm of all views, as the tests read it.
 
     Pixels without a reading take the empty scene's depth, and FAR_MM where that is unknown
     too or the image ends.
@@ -84,9 +93,9 @@ def depth_stack(views):
     return out
 
 
-def centres(points, views):
+def centres(points: AnyArray, views: Sequence[ObservedView]) -> Float32Array:
     """Return (n, V, 3) float32 rows (u, v, pixels per metre) of world points (n, 3)."""
-    return forest_pixels.centres(
+    return kernels.centres(
         np.ascontiguousarray(points, np.float64),
         np.stack([np.asarray(v.camera.K, np.float64) for v in views]),
         np.stack([inverse(v.camera.T_world_camera) for v in views]))

@@ -1,14 +1,15 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The energy of Eq. 1 (Basevi & Leonardis 2016) for any subset of candidates.
+The energy of Eq. 1 (Basevi & Leonardis 2016, section 4) for any subset of candidates.
 
     E = (1/Npix) sum_i min(|d_i - d~_i|, dmax) / dmax + (1/Npix) sum_i (1 - p_i)
         + (1/Nobj) sum_k v_k
 
 `d` is the depth of the posed models and the empty scene, nearest wins, `d~` the measured one,
-`p_i` the probability of the category that is shown at pixel i (background where none is), `v_k`
-the share of object k's volume inside any other chosen object. Where the paper is silent:
+`p_i` the probability of the category shown at pixel i (background where none is), `v_k`
+the share of object k's volume inside any other chosen object. Npix is the number of pixels, Nobj
+that of chosen objects. Where the paper is silent:
 
 - Npix counts the pixels of all views that have a reading; the others are left out.
 - Where the empty scene's depth is unknown, showing it costs no depth: no claim is made there.
@@ -16,27 +17,38 @@ the share of object k's volume inside any other chosen object. Where the paper i
 - The overlap of the empty subset is 0.
 """
 
+from collections.abc import Sequence
+
+from hooc_perception.core.arrays import AnyArray, BoolArray, Float32Array, Float64Array, Int64Array
 from hooc_perception.core.energy.compositor import Compositor
 from hooc_perception.core.energy.images_and_volumes import ImagesAndVolumes
 from hooc_perception.core.energy.overlap import OverlapTerm
-from hooc_perception.core.frame.pixel_index import rows_of_pixels, stacked_index
+from hooc_perception.core.frame.pixel_index import first_pixels, rows_of_pixels, stacked_index
 from hooc_perception.core.geometry import posed_vertices
 from hooc_perception.core.render import render_patch
-from hooc_perception.core.types import Energy
+from hooc_perception.core.types import (
+    Candidates,
+    Energy,
+    GenericModel,
+    Observation,
+    PixelProbabilities,
+)
 import numpy as np
 
+# Truncation of a depth residual (the paper's 100 mm).
 D_MAX_M = 0.1
 
 
-def pixel_lists(observation, objects, models):
+def pixel_lists(observation: Observation, objects: Candidates, models: Sequence[GenericModel],
+                ) -> tuple[Int64Array, Int64Array, Float32Array]:
     """
     Render every object alone into every view.
 
     :return: (offsets (n + 1,) int64, pixel (E,) int64, depth (E,) float32 metres); entries
-        offsets[k]:offsets[k + 1] belong to object k, and pixels of all views are numbered
-        through, view by view, row by row.
+        offsets[k]:offsets[k + 1] belong to object k; the pixels of all views share one
+        numbering, see core/frame/pixel_index.py.
     """
-    first = np.cumsum([0] + [view.depth.size for view in observation.views])
+    first = first_pixels(observation.views)
     counts, pixels, depths = [0], [np.zeros(0, np.int64)], [np.zeros(0, np.float32)]
     for k in range(len(objects)):
         model = models[objects.category[k] - 1]
@@ -59,12 +71,13 @@ class Eq1(ImagesAndVolumes):
     See core/energy/compositor.py for `mask`, `value`, `deltas`, `flip`, `reset` and `evaluate`.
 
     :param pool: Candidates; class id c is models[c - 1].
-    :param max_instances: most chosen candidates a category; 0 = no limit, as in the paper.
-    :param d_max: truncation of a depth residual, metres (the paper's 100 mm).
+    :param max_instances: most chosen candidates per category; 0 = no limit, as in the paper.
+    :param d_max: truncation of a depth residual, metres.
     """
 
-    def __init__(self, observation, probabilities, pool, models, max_instances=0,
-                 d_max=D_MAX_M):
+    def __init__(self, observation: Observation, probabilities: PixelProbabilities,
+                 pool: Candidates, models: Sequence[GenericModel], max_instances: int = 0,
+                 d_max: float = D_MAX_M) -> None:
         """Render the candidates into all views and compare their volumes."""
         self.n = len(pool)
         measured = np.concatenate([view.depth.ravel() for view in observation.views])
@@ -95,30 +108,30 @@ class Eq1(ImagesAndVolumes):
                        max_per_group=max_instances), OverlapTerm(pool, models))
 
     @property
-    def value(self):
-        """Return E of the current subset."""
+    def value(self) -> float:
+        """Return E (Eq. 1) of the current subset."""
         n = np.count_nonzero(self._images.mask)
         return self._images.value / self.n_pixels + self._overlap.value / max(n, 1)
 
-    def deltas(self):
+    def deltas(self) -> Float64Array:
         """Return (n,) float64: the change of E by each flip, inf where it is not allowed."""
         mask, shares = self._images.mask, self._overlap.value
         n = np.count_nonzero(mask)
         mean = (shares + self._overlap.deltas()) / np.maximum(n + np.where(mask, -1, 1), 1)
         return self._images.deltas() / self.n_pixels + mean - shares / max(n, 1)
 
-    def evaluate(self, mask):
+    def evaluate(self, mask: BoolArray) -> float:
         """Return E of the subset `mask` (n,) bool; the current one stays."""
         n = max(np.count_nonzero(mask), 1)
         return self._images.evaluate(mask) / self.n_pixels + self._overlap.evaluate(mask) / n
 
-    def energy(self, mask):
-        """Return the Energy of the subset `mask` (n,) bool, term by term, not rounded."""
+    def energy(self, mask: BoolArray) -> Energy:
+        """Return the three terms of Eq. 1 for the subset `mask` (n,) bool, not rounded."""
         entry = self._images.entries_shown(mask)
         seen, pixels = entry >= 0, self._images.pixels
         hidden = pixels[seen]
 
-        def total(none, shown):
+        def total(none: AnyArray, shown: AnyArray) -> float:
             return float(none.sum() - none[hidden].sum() + shown[entry[seen]].sum())
 
         return Energy(total(self._none_depth, self._depth) / self.n_pixels,
@@ -126,6 +139,7 @@ class Eq1(ImagesAndVolumes):
                       float(self._overlap.evaluate(mask)) / max(np.count_nonzero(mask), 1))
 
 
-def energy_of(observation, probabilities, objects, models):
-    """Return the Energy of a set of objects (Candidates), all of them shown; for reports."""
+def energy_of(observation: Observation, probabilities: PixelProbabilities, objects: Candidates,
+              models: Sequence[GenericModel]) -> Energy:
+    """Return the Energy of a set of objects, all of them shown; for reports."""
     return Eq1(observation, probabilities, objects, models).energy(np.ones(len(objects), bool))

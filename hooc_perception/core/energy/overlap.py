@@ -5,18 +5,27 @@ Share of an object's volume inside other objects: v_k of Eq. 1, exact for every 
 
 Each generic model has 512 fixed samples of its interior and a boolean occupancy grid, both in
 its unit bounding box, so that scaled and posed copies share them. For every pair of candidates
-one bit a sample says whether it lies inside the other one; the union over any subset is then a
+one bit per sample says whether it lies inside the other one; the union over any subset is then a
 bitwise or, and containment needs no special case. Inside is where the mesh winds around a cell
-(so parts may overlap, and the whole may be inside out). On a surface that is not closed the
-rays along different axes contradict one another: the majority of three decides, and where even
-that disowns the model's own interior points, the space around these counts as its inside.
-That way no category has to be left out (the paper had to leave out dustpan and tray).
+(so parts may overlap, and the whole may be inside out). On a surface that is not closed, rays
+along different axes contradict one another: the majority of three decides. If even that excludes
+the model's own interior points, the space around these counts as its inside. Therefore no
+category has to be left out (the paper left out dustpan and tray).
 """
 
+from collections.abc import Sequence
+
+from hooc_perception.core.arrays import (
+    BoolArray,
+    Float64Array,
+    Int32Array,
+    UInt64Array,
+)
 from hooc_perception.core.energy.kernels import overlap as kernels
 from hooc_perception.core.memo import per_model
+from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 from scipy.spatial.transform import Rotation
 
 SAMPLES = 512
@@ -26,7 +35,7 @@ BELIEVABLE = 0.75
 
 
 @per_model
-def occupancy(model):
+def occupancy(model: GenericModel) -> BoolArray:
     """
     Return the (CELLS, CELLS, CELLS) bool grid over the bounding box of a GenericModel.
 
@@ -53,7 +62,7 @@ def occupancy(model):
     return grid
 
 
-def interior_samples(model, count=SAMPLES):
+def interior_samples(model: GenericModel, count: int = SAMPLES) -> Float64Array:
     """
     Return (count, 3) float64 interior samples in the unit bounding box, centred at 0.
 
@@ -71,14 +80,15 @@ class OverlapTerm:
     """
     The sum of v_k over the objects of a subset, kept up to date flip by flip.
 
-    It has what a search needs (see compositor.py); `value` and `deltas()` are in shares of
-    a volume, so a weighted sum with a Compositor is one more energy.
+    It has the interface that a search needs (see compositor.py). `value` and `deltas()` are in
+    shares of a volume, so its weighted sum with a Compositor is again an energy.
 
     :param objects: Candidates; class id c is models[c - 1].
     :param count: samples of each interior, a multiple of 64.
     """
 
-    def __init__(self, objects, models, count=SAMPLES):
+    def __init__(self, objects: Candidates, models: Sequence[GenericModel],
+                 count: int = SAMPLES) -> None:
         """Compare all pairs whose bounding boxes meet; start from the empty subset."""
         self.n = n = len(objects)
         self._count = count
@@ -99,37 +109,37 @@ class OverlapTerm:
         # Keep pairs with a common volume, both directions, ordered by the first.
         mirror = np.lexsort((pairs[:, 0], pairs[:, 1]))
         kept = bits.any(1) | bits[mirror].any(1)
-        self._other = pairs[kept, 1]
-        self._bits = bits[kept]
+        self._other: Int32Array = pairs[kept, 1]
+        self._bits: UInt64Array = bits[kept]
         self._start = np.searchsorted(pairs[kept, 0], np.arange(n + 1))
         self._reverse = np.lexsort((pairs[kept, 0], pairs[kept, 1]))
         self._union, self._once = np.zeros((2, n, count // 64), np.uint64)
         self.reset(self._active)
 
     @property
-    def mask(self):
+    def mask(self) -> BoolArray:
         """Return a copy of the current subset, (n,) bool."""
         return self._active.copy()
 
     @property
-    def value(self):
+    def value(self) -> float:
         """Return the sum of v_k over the current subset."""
         return self._covered / self._count
 
-    def reset(self, mask):
+    def reset(self, mask: BoolArray) -> None:
         """Start again from the subset `mask` (n,) bool."""
         self._active[:] = mask
-        self._covered = kernels.cover_all(self._start, self._other, self._bits, self._active,
-                                          self._union, self._once)
+        self._covered: int | np.int64 = kernels.cover_all(self._start, self._other, self._bits,
+                                               self._active, self._union, self._once)
 
-    def deltas(self):
+    def deltas(self) -> Float64Array:
         """Return (n,) float64: the change of `value` by each flip."""
         deltas = np.zeros(self.n, np.int64)
         kernels.flip_deltas(self._start, self._other, self._reverse, self._bits, self._active,
                             self._union, self._once, deltas)
         return deltas / self._count
 
-    def flip(self, k):
+    def flip(self, k: int) -> None:
         """Let object k join the subset, or leave it if it is in."""
         self._covered = self._covered + kernels.flip_delta(
             k, self._start, self._other, self._reverse, self._bits, self._active, self._union,
@@ -137,7 +147,7 @@ class OverlapTerm:
         kernels.flip(k, self._start, self._other, self._bits, self._active, self._union,
                      self._once)
 
-    def shares(self, mask):
+    def shares(self, mask: BoolArray) -> Float64Array:
         """Return (m,) float64: v_k of each member of the subset `mask` (n,) bool."""
         members = np.flatnonzero(mask)
         counts = np.zeros(len(members), np.int64)
@@ -145,12 +155,22 @@ class OverlapTerm:
                         counts)
         return counts / self._count
 
-    def evaluate(self, mask):
+    def pairwise(self) -> Float64Array:
+        """Return (n, n) float64: share of the volume of row k inside object j, subset or not."""
+        shares = np.zeros((self.n, self.n))
+        for k in range(self.n):
+            run = slice(self._start[k], self._start[k + 1])
+            shares[k, self._other[run]] = (np.bitwise_count(self._bits[run]).sum(1)
+                                           / self._count)
+        return shares
+
+    def evaluate(self, mask: BoolArray) -> float:
         """Return the sum of v_k over the subset `mask` (n,) bool; the current one stays."""
         return float(self.shares(mask).sum())
 
 
-def _meeting_pairs(R, translation, size):
+def _meeting_pairs(R: Float64Array, translation: Float64Array,
+                   size: Float64Array) -> Int32Array:
     """Return (m, 2) int32 ordered pairs, both directions, whose world boxes and spheres meet."""
     half = 0.5 * np.einsum('nij,nj->ni', np.abs(R), size)
     radius = 0.5 * np.linalg.norm(size, axis=1)
@@ -161,16 +181,12 @@ def _meeting_pairs(R, translation, size):
     return np.argwhere(meet).astype(np.int32)
 
 
-def pairwise(objects, models):
+def pairwise(objects: Candidates, models: Sequence[GenericModel]) -> Float64Array:
     """Return (n, n) float64: share of the volume of row k inside object j; 0 on the diagonal."""
-    term = OverlapTerm(objects, models)
-    shares = np.zeros((term.n, term.n))
-    for k in range(term.n):
-        run = slice(term._start[k], term._start[k + 1])
-        shares[k, term._other[run]] = np.bitwise_count(term._bits[run]).sum(1) / SAMPLES
-    return shares
+    return OverlapTerm(objects, models).pairwise()
 
 
-def union_shares(objects, models, count=SAMPLES):
+def union_shares(objects: Candidates, models: Sequence[GenericModel],
+                 count: int = SAMPLES) -> Float64Array:
     """Return (n,) float64: share of each object's volume inside any of the others."""
     return OverlapTerm(objects, models, count).shares(np.ones(len(objects), bool))

@@ -3,17 +3,20 @@
 """
 Iterative closest point: align a cloud to a fixed one, or to a generic model.
 
-Own kernels rather than Open3D's because a scene of the `paper` profile takes 5,000 of them:
-what a model's nearest-neighbour lattice costs is paid once a process. The tests hold the result
-against Open3D's registration_icp.
+The `paper` profile runs 5,000 alignments per scene. Own kernels, rather than Open3D's, build the
+nearest-neighbour lattice of a model only once per process. The tests compare the results with
+Open3D's registration_icp.
 """
 
 from dataclasses import dataclass
 
+from hooc_perception.core.arrays import AnyArray, Float64Array, Int64Array
 from hooc_perception.core.memo import per_model
 from hooc_perception.core.methods.kernels import icp as kernels
+from hooc_perception.core.methods.kernels.icp import Passes, TargetCloud
+from hooc_perception.core.types import GenericModel
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 
 # Steps along the longest side of the lattice, which is the cloud's box and a margin around it
 # of half the longest side; a finer one only saves steps of the walk that follows the look-up.
@@ -23,45 +26,26 @@ NEIGHBOURS = 12
 
 
 @dataclass(frozen=True)
-class TargetCloud:
-    """
-    A fixed cloud ready for nearest-neighbour look-ups; made by `target_cloud`.
-
-    :ivar points: (P, 3) float64 metres; `normals` (P, 3) float64 unit, or zeros.
-    :ivar grid: (nx, ny, nz) int32 nearest point of each node of a lattice with its first node
-        at `origin` (3,) and steps of `cell`; it ends at least `margin` metres off all points.
-    :ivar graph: (P, k) int32 nearest neighbours of each point.
-    """
-
-    points: np.ndarray
-    normals: np.ndarray
-    grid: np.ndarray
-    origin: np.ndarray
-    cell: float
-    margin: float
-    graph: np.ndarray
-
-
-@dataclass(frozen=True)
 class IcpResult:
     """
     An alignment with its evidence.
 
     :ivar T_target_source: (4, 4) float64.
+    :ivar iterations: steps done.
     :ivar pairs: number of source points with a partner within reach.
     :ivar rms_m: root mean square distance of these pairs, metres.
-    :ivar converged: whether the steps died out before the iterations ended.
+    :ivar converged: whether the steps became smaller than the tolerance.
     """
 
-    T_target_source: np.ndarray
+    T_target_source: Float64Array
     iterations: int
     pairs: int
     rms_m: float
     converged: bool
 
 
-def target_cloud(points, normals=None):
-    """Return the TargetCloud of (P, 3) points in metres, P > 0, with optional normals."""
+def target_cloud(points: AnyArray, normals: AnyArray | None = None) -> TargetCloud:
+    """Return the TargetCloud of (P, 3) points in metres, P > 0, with optional normals (P, 3)."""
     points = np.ascontiguousarray(points, np.float64)
     normals = (np.zeros_like(points) if normals is None
                else np.ascontiguousarray(normals, np.float64))
@@ -82,43 +66,42 @@ def target_cloud(points, normals=None):
 
 
 @per_model
-def model_cloud(model):
+def model_cloud(model: GenericModel) -> TargetCloud:
     """Return the TargetCloud of a GenericModel's surface samples, at its own size."""
     return target_cloud(model.surface_points, model.surface_normals)
 
 
-def nearest(target, points, reach=np.inf):
+def nearest(target: TargetCloud, points: AnyArray,
+            reach: float = np.inf) -> tuple[Int64Array, Float64Array]:
     """
     Return (index (n,), distance (n,) metres) of the target's point nearest to each of `points`.
 
-    Beyond `reach` metres they are -1 and inf.
+    :param points: (n, 3) metres.
+    :param reach: beyond this distance in metres the index is -1 and the distance inf.
     """
     index, distance = np.zeros(len(points), np.int64), np.zeros(len(points))
     for i, (x, y, z) in enumerate(np.asarray(points, np.float64)):
-        index[i], d2 = kernels.nearest(x, y, z, target.points, target.grid, target.origin,
-                                       target.cell, target.margin, target.graph, reach)
+        index[i], d2 = kernels.nearest(x, y, z, target, reach)
         distance[i] = np.sqrt(d2)
     return index, distance
 
 
-def align(target, source, T_target_source, reach, iterations=50, plane=False, tolerance=1e-6):
+def align(target: TargetCloud, source: AnyArray, T_target_source: Float64Array, reach: float,
+          iterations: int = 50, plane: bool = False, tolerance: float = 1e-6) -> IcpResult:
     """
     Align a cloud to a fixed one by ICP.
 
-    :param target: TargetCloud.
     :param source: (n, 3) metres, n >= 6.
-    :param T_target_source: (4, 4) where to start.
+    :param T_target_source: (4, 4) initial transform.
     :param reach: pairs farther apart than this, metres, do not count.
     :param plane: minimise distances to tangent planes instead of points.
     :param tolerance: radians, and the same times the source's spread in metres.
-    :return: IcpResult.
     """
     R, t = (np.array(T_target_source[:3, :3], np.float64, order='C'),
             np.array(T_target_source[:3, 3], np.float64))
     done, pairs, rms, converged = kernels.align(
-        np.ascontiguousarray(source, np.float64), 1, target.points, target.normals, target.grid,
-        target.origin, target.cell, target.margin, target.graph, R, t, reach, iterations, plane,
-        tolerance)
+        np.ascontiguousarray(source, np.float64), target, R, t,
+        Passes(1, float(reach), iterations, plane, float(tolerance)))
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = R, t
     return IcpResult(T, done, pairs, rms, converged)

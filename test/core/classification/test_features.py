@@ -3,15 +3,8 @@
 """Normals, fused field, segments and features against analytic scenes."""
 
 from hooc_perception.core.classification import features
-from hooc_perception.core.classification.kernels import (
-    field as forest_field,
-)
-from hooc_perception.core.classification.kernels import (
-    segments as forest_segments,
-)
-from hooc_perception.core.classification.kernels import (
-    smoothing as forest_smooth,
-)
+from hooc_perception.core.classification.kernels import projective_field, smoothing
+from hooc_perception.core.classification.kernels import segments as forest_segments
 from hooc_perception.core.classification.kernels.texture import normal_shape
 from hooc_perception.core.geometry import inverse, project, transform
 import numpy as np
@@ -42,9 +35,9 @@ def test_pixels_lie_on_the_boxes_and_normals_face_the_cameras(scene):
 def test_field_is_the_largest_difference_of_depth_over_the_views(scene):
     observation, _, around = scene
     rng = np.random.default_rng(0)
-    cells = np.column_stack([rng.integers(0, n, 300) for n in around.field.shape])
-    points = around.origin + cells * around.cell
-    best = np.full(len(points), -forest_field.FIELD_LIMIT - 1.0)
+    cells = np.column_stack([rng.integers(0, n, 300) for n in around.field.values.shape])
+    points = around.field.origin + cells * around.field.cell
+    best = np.full(len(points), -projective_field.FIELD_LIMIT - 1.0)
     for view in observation.views:
         local = transform(inverse(view.camera.T_world_camera), points)
         u, v = project(view.camera.K, local)
@@ -52,9 +45,9 @@ def test_field_is_the_largest_difference_of_depth_over_the_views(scene):
         inside = (c >= 0) & (r >= 0) & (c < view.camera.width) & (r < view.camera.height)
         d = np.full(len(points), np.nan)
         d[inside] = view.depth[r[inside], c[inside]]
-        q = np.clip((d - local[:, 2]) / forest_field.FIELD_UNIT_M, -120, 120)
+        q = np.clip((d - local[:, 2]) / projective_field.FIELD_UNIT_M, -120, 120)
         best = np.where(np.isfinite(q), np.maximum(best, q), best)
-    got = around.field[tuple(cells.T)].astype(float)
+    got = around.field.values[tuple(cells.T)].astype(float)
     # A projection that falls on the border of two pixels may take either.
     assert np.mean(np.abs(got - best) <= 1.0) > 0.98
     assert (got == -121).any() or (best > -121).all()
@@ -62,19 +55,19 @@ def test_field_is_the_largest_difference_of_depth_over_the_views(scene):
 
 def test_marching_measures_the_box_from_inside(scene):
     _, _, around = scene
-    width = sum(forest_field.march(around.field, around.origin, around.cell, -0.15, 0.0, 0.09,
-                                   s, 0.0, 0.0, 0.004, 40, False, 12) for s in (-1.0, 1.0))
+    width = sum(projective_field.march(around.field, (-0.15, 0.0, 0.09), (s, 0.0, 0.0), 0.004, 40,
+                                       False, 12) for s in (-1.0, 1.0))
     assert width == pytest.approx(0.1, abs=0.03)
 
 
 def test_segments_hold_one_box_each_and_measure_it(scene):
     _, pixels, around = scene
     left = pixels.points[:, 0] < 0
-    ids = around.ids[2][around.voxel]
+    ids = around.segments.ids[2][around.voxel]
     main = [np.bincount(ids[side]).argmax() for side in (left, ~left)]
     assert main[0] != main[1]
     assert np.mean(ids[left] == main[0]) > 0.9 and np.mean(ids[~left] == main[1]) > 0.9
-    length, breadth, height = around.shapes[2, main[1], :3]
+    length, breadth, height = around.segments.shapes[2, main[1], :3]
     assert (length, breadth) == pytest.approx((0.2, 0.06), abs=0.025)
     assert height == pytest.approx(0.06, abs=0.02)
 
@@ -127,13 +120,13 @@ def test_probes_reach_from_one_to_twentyfive_centimetres():
 
 def test_thinned_pixels_take_a_neighbour_of_their_own_surface(scene):
     _, pixels, _ = scene
-    rows, donor = forest_smooth.thin(pixels.camera, pixels.uv, pixels.points, 2)
+    rows, donor = smoothing.thin(pixels.camera, pixels.uv, pixels.points, 2)
     assert len(rows) < 0.5 * len(donor)
     speaks = rows[donor]
     assert (donor[rows] == np.arange(len(rows))).all()
     assert (pixels.camera[speaks] == pixels.camera).all()
     assert np.linalg.norm(pixels.points[speaks] - pixels.points, axis=1).max() < 0.015
-    everyone, same = forest_smooth.thin(pixels.camera, pixels.uv, pixels.points, 1)
+    everyone, same = smoothing.thin(pixels.camera, pixels.uv, pixels.points, 1)
     assert (everyone[same] == np.arange(len(donor))).all()
 
 
@@ -141,7 +134,7 @@ def test_probabilities_spread_along_edges_and_stop_at_cuts():
     pairs = np.array([[0, 1], [1, 2], [2, 3]], np.int32)
     weight = np.array([1.0, 1.0, 0.0], np.float32)
     p = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], np.float32)
-    out = forest_smooth.spread(p, np.array([0, 3]), 5, pairs, weight, 30)
+    out = smoothing.spread(p, np.array([0, 3]), 5, pairs, weight, 30)
     np.testing.assert_allclose(out[:3], np.tile(p[0], (3, 1)), atol=1e-5)
     np.testing.assert_allclose(out[3], p[1], atol=1e-5)
     # Nobody knows anything of the last voxel: background.

@@ -122,9 +122,10 @@ def test_pixel_walk_compares_two_depths_in_any_view():
     image = np.arange(2 * 20 * 30, dtype=np.uint16).reshape(1, 2, 20, 30)
     centre = np.array([[[10, 10, 100.0], [5, 6, 50.0]]], np.float32)
     # At 0.02 m and 50 pixels a metre the second offset is one pixel to the right.
-    assert forest_pixels.respond(image[0, 1], centre[0, 1], 0.0, 0.02, 0.02, 0.0, 4000) == (
+    offsets = np.array([[0.0, 0.02, 0.02, 0.0], [-1.0, 0.0, 0.0, 0.0]], np.float32)
+    assert forest_pixels.respond(image[0, 1], centre[0, 1], offsets[0], 4000) == (
         int(image[0, 1, 7, 5]) - int(image[0, 1, 6, 6]))
-    assert forest_pixels.respond(image[0, 1], centre[0, 1], -1.0, 0.0, 0.0, 0.0, 4000) == (
+    assert forest_pixels.respond(image[0, 1], centre[0, 1], offsets[1], 4000) == (
         4000 - int(image[0, 1, 6, 5]))
     forest = Forest(np.array([0, -1, -1], np.int32), np.array([29, 0, 0], np.float32),
                     np.array([1, 0, 0], np.int32), np.zeros(1, np.int32),

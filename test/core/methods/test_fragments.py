@@ -5,7 +5,7 @@
 from dataclasses import replace
 
 from hooc_perception.core.geometry import posed_vertices
-from hooc_perception.core.methods.fragments import _Scene, FragmentConfig, propose_fragments
+from hooc_perception.core.methods.fragments import FragmentConfig, propose_fragments, scene_arrays
 from hooc_perception.core.methods.icp import model_cloud
 from hooc_perception.core.methods.kernels import fragments as kernels
 from hooc_perception.core.render import render_depth
@@ -137,14 +137,15 @@ def test_icp_is_what_brings_them_there(scene, pool):
 
 def residuals(scene, translation, scale, visible=None):
     """Return (forward, backward) of the ball at a place and scale against its true fragment."""
-    parts = _Scene(*scene)
+    parts = scene_arrays(*scene)
+    images = parts.images
     fragment = parts.points[np.linalg.norm(parts.points - TRUTH.translation[1], axis=1) < .06]
-    cloud = model_cloud(MODELS[1])
-    depth = parts.depth if visible is None else np.where(visible, parts.depth, .3).astype('f4')
+    if visible is not None:
+        images = images._replace(depth=np.where(visible, images.depth, .3).astype('f4'))
+    rules = kernels.Rules(.0, .0, 48, 0, 0, 20, 128, truncation_m=.02, score_step=4)
     return kernels.disagreement(
-        fragment, len(fragment), cloud.points, cloud.normals, cloud.grid, cloud.origin,
-        cloud.cell, cloud.margin, cloud.graph, scale, np.eye(3), np.asarray(translation), 4, .02,
-        depth, *parts.views(), parts.C)
+        fragment, len(fragment), model_cloud(MODELS[1]),
+        kernels.Pose(scale, np.eye(3), np.asarray(translation)), rules, images)
 
 
 def test_both_residuals_are_small_at_the_truth_and_each_rises_for_its_own_fault(scene):

@@ -2,17 +2,41 @@
 # SPDX-License-Identifier: Apache-2.0
 """Voxel graph of the foreground, its convex segments, and their shape measures."""
 
+from typing import NamedTuple
+
+from hooc_perception.core.arrays import Float32Array, Float64Array, Int32Array, Int64Array
 from hooc_perception.core.classification.kernels.texture import normal_shape
 from hooc_perception.core.frame.kernels.patches import root
 import numba as nb
 import numpy as np
 
-SEGMENT_FEATURES = 40
+# Columns of a segment's frame: horizontal centre, long horizontal axis (from the narrow to the
+# wide end), lowest point.
+CENTRE_X, CENTRE_Y, AXIS_X, AXIS_Y, LOWEST, FRAME_COLUMNS = range(6)
+# Columns of a segment's features.
 SLICES = 6
+LENGTH, BREADTH, HEIGHT, BOTTOM, AREA, BREADTH_RATIO, HEIGHT_RATIO, SPREADS = range(8)
+MEAN_NORMAL_Z, FLAT_SHARE, WALL_SHARE, CIRCLE_RADIUS, CIRCLE_RESIDUAL = range(
+    SPREADS + 3, SPREADS + 8)
+FILL, MEAN_HEIGHT, TOP, SLICE_WIDTH = range(CIRCLE_RESIDUAL + 1, CIRCLE_RESIDUAL + 5)
+SLICE_TOP = SLICE_WIDTH + SLICES
+SLICE_SHARE = SLICE_TOP + SLICES
+NORMAL_SHAPE = SLICE_SHARE + SLICES
+SEGMENT_FEATURES = NORMAL_SHAPE + 4
+# Extents leave out this share of the voxels at either end.
+QUANTILE = 0.01
+# Most edges per voxel, their greatest length in cells, and the cosine of the angle between
+# normals beyond which two voxels lie on opposite sides of a thin sheet.
+MOST_EDGES, LONGEST_EDGE, OPPOSITE = 40, 2.2, -0.5
+# Shares in an edge's weight: angle between the normals, distance in cells, its own concave
+# angle, the mean concave angle around each of the two voxels.
+BEND_SHARE, DISTANCE_SHARE, OWN_SHARE, AROUND_SHARE = 0.05, 0.2, 0.5, 0.25
 
 
 @nb.njit(cache=True)
-def voxelise(points, normals, origin, cell, shape):
+def voxelise(points: Float64Array, normals: Float64Array, origin: Float64Array, cell: float,
+             shape: tuple[int, int, int]
+             ) -> tuple[Int32Array, Float64Array, Float64Array, Int32Array]:
     """
     Return (voxel of each point (n,) int32, mean points (m, 3), unit normals (m, 3), grid).
 
@@ -47,8 +71,45 @@ def voxelise(points, normals, origin, cell, shape):
     return voxel, mean, normal, grid
 
 
+class _Edges(NamedTuple):
+    """
+    Edges under construction.
+
+    :ivar pairs: (most, 2) int32; weight and valley (most,) float32, the concave angle.
+    :ivar total: (m,) float32 sum of the concave angles around each voxel; degree (m,) float32.
+    """
+
+    pairs: Int32Array
+    weight: Float32Array
+    valley: Float32Array
+    total: Float32Array
+    degree: Float32Array
+
+
+@nb.njit(cache=True, inline='always')
+def _joint(mean: Float64Array, normal: Float64Array, v: int, w: int,
+           cell: float) -> tuple[float, float, float]:
+    """Return (distance metres, bend, concave angle) of two voxels; distance inf = no edge."""
+    dx, dy, dz = (mean[w, 0] - mean[v, 0], mean[w, 1] - mean[v, 1], mean[w, 2] - mean[v, 2])
+    d = np.sqrt(dx * dx + dy * dy + dz * dz)
+    if d > LONGEST_EDGE * cell or d < 1e-9:
+        return np.inf, 0.0, 0.0
+    pv = (normal[v, 0] * dx + normal[v, 1] * dy + normal[v, 2] * dz) / d
+    pw = (normal[w, 0] * dx + normal[w, 1] * dy + normal[w, 2] * dz) / d
+    dot = (normal[v, 0] * normal[w, 0] + normal[v, 1] * normal[w, 1]
+           + normal[v, 2] * normal[w, 2])
+    bend = np.arccos(min(1.0, max(-1.0, dot)))
+    # Normals that turn towards each other: pv > 0 or pw < 0 is a valley.
+    concave = min(bend, max(0.0, pv - pw))
+    # Seen from opposite sides, a thin sheet: no valley between them.
+    if dot < OPPOSITE:
+        concave = 0.0
+    return d, bend, concave
+
+
 @nb.njit(cache=True)
-def edges(mean, normal, grid, origin, cell):
+def edges(mean: Float64Array, normal: Float64Array, grid: Int32Array, origin: Float64Array,
+          cell: float) -> tuple[Int32Array, Float32Array]:
     """
     Return (pairs (e, 2) int32, weight (e,) float32) of voxels that touch (5^3 neighbours).
 
@@ -58,14 +119,13 @@ def edges(mean, normal, grid, origin, cell):
     distance, so that smooth and close joints close first. The shares maximised the overlap
     of segments with objects.
     """
-    pairs = np.empty((mean.shape[0] * 40, 2), np.int32)
-    weight = np.empty(mean.shape[0] * 40, np.float32)
-    valley = np.empty(mean.shape[0] * 40, np.float32)
-    total = np.zeros(mean.shape[0], np.float32)
-    degree = np.zeros(mean.shape[0], np.float32)
+    m = mean.shape[0]
+    most = m * MOST_EDGES
+    out = _Edges(np.empty((most, 2), np.int32), np.empty(most, np.float32),
+                 np.empty(most, np.float32), np.zeros(m, np.float32), np.zeros(m, np.float32))
     e = 0
     nx, ny, nz = grid.shape
-    for v in range(mean.shape[0]):
+    for v in range(m):
         a = min(max(int((mean[v, 0] - origin[0]) / cell), 0), nx - 1)
         b = min(max(int((mean[v, 1] - origin[1]) / cell), 0), ny - 1)
         c = min(max(int((mean[v, 2] - origin[2]) / cell), 0), nz - 1)
@@ -73,39 +133,29 @@ def edges(mean, normal, grid, origin, cell):
             for j in range(max(0, b - 2), min(ny, b + 3)):
                 for k in range(max(0, c - 2), min(nz, c + 3)):
                     w = grid[i, j, k]
-                    if w <= v or e >= weight.shape[0]:
+                    if w <= v or e >= most:
                         continue
-                    dx, dy, dz = (mean[w, 0] - mean[v, 0], mean[w, 1] - mean[v, 1],
-                                  mean[w, 2] - mean[v, 2])
-                    d = np.sqrt(dx * dx + dy * dy + dz * dz)
-                    if d > 2.2 * cell or d < 1e-9:
+                    d, bend, concave = _joint(mean, normal, v, w, cell)
+                    if d == np.inf:
                         continue
-                    pv = (normal[v, 0] * dx + normal[v, 1] * dy + normal[v, 2] * dz) / d
-                    pw = (normal[w, 0] * dx + normal[w, 1] * dy + normal[w, 2] * dz) / d
-                    dot = (normal[v, 0] * normal[w, 0] + normal[v, 1] * normal[w, 1]
-                           + normal[v, 2] * normal[w, 2])
-                    bend = np.arccos(min(1.0, max(-1.0, dot)))
-                    # Normals that turn towards each other: pv > 0 or pw < 0 is a valley.
-                    concave = min(bend, max(0.0, pv - pw))
-                    # Seen from opposite sides, a thin sheet: no valley between them.
-                    if dot < -0.5:
-                        concave = 0.0
-                    pairs[e, 0], pairs[e, 1] = v, w
-                    valley[e] = concave
-                    weight[e] = 0.05 * bend + 0.2 * d / cell
-                    total[v] += concave
-                    total[w] += concave
-                    degree[v] += 1
-                    degree[w] += 1
+                    out.pairs[e, 0], out.pairs[e, 1] = v, w
+                    out.valley[e] = concave
+                    out.weight[e] = BEND_SHARE * bend + DISTANCE_SHARE * d / cell
+                    out.total[v] += concave
+                    out.total[w] += concave
+                    out.degree[v] += 1
+                    out.degree[w] += 1
                     e += 1
     for i in range(e):
-        v, w = pairs[i, 0], pairs[i, 1]
-        weight[i] += 0.5 * valley[i] + 0.25 * (total[v] / degree[v] + total[w] / degree[w])
-    return pairs[:e], weight[:e]
+        v, w = out.pairs[i, 0], out.pairs[i, 1]
+        out.weight[i] += OWN_SHARE * out.valley[i] + AROUND_SHARE * (
+            out.total[v] / out.degree[v] + out.total[w] / out.degree[w])
+    return out.pairs[:e], out.weight[:e]
 
 
 @nb.njit(cache=True)
-def segment(n, pairs, weight, order, k, smallest):
+def segment(n: int, pairs: Int32Array, weight: Float32Array, order: Int64Array, k: float,
+            smallest: int) -> Int32Array:
     """
     Return (n,) int32 segment ids 0.. by graph merging (Felzenszwalb and Huttenlocher 2004).
 
@@ -145,7 +195,7 @@ def segment(n, pairs, weight, order, k, smallest):
 
 
 @nb.njit(cache=True)
-def _spread(values, low, high):
+def _spread(values: Float64Array, low: float, high: float) -> tuple[float, float]:
     """Return (low, high) quantiles of a non-empty array."""
     s = np.sort(values)
     n = s.shape[0] - 1
@@ -153,15 +203,8 @@ def _spread(values, low, high):
 
 
 @nb.njit(cache=True)
-def describe(ids, n_segments, mean, normal, cell):
-    """
-    Return (frames (s, 5), features (s, SEGMENT_FEATURES)) of segments, gravity aligned.
-
-    A frame is (cx, cy, ax, ay, zmin): the horizontal centre, the long horizontal axis (from
-    the narrow to the wide end) and the lowest point. Lengths in metres.
-    """
-    frames = np.zeros((n_segments, 5))
-    out = np.zeros((n_segments, SEGMENT_FEATURES), np.float32)
+def _members(ids: Int32Array, n_segments: int) -> tuple[Int64Array, Int64Array]:
+    """Return (order (m,), start (n_segments + 1,)): the voxels, segment by segment."""
     count = np.bincount(ids, minlength=n_segments)
     start = np.zeros(n_segments + 1, np.int64)
     start[1:] = np.cumsum(count)
@@ -170,89 +213,152 @@ def describe(ids, n_segments, mean, normal, cell):
     for i in range(ids.shape[0]):
         order[fill[ids[i]]] = i
         fill[ids[i]] += 1
+    return order, start
+
+
+@nb.njit(cache=True)
+def _describe_normals(normal: Float64Array, members: Int64Array, f: Float32Array) -> None:
+    """Fill the columns of f that the normals of a segment determine."""
+    n = members.shape[0]
+    flat, wall, nz_sum = 0.0, 0.0, 0.0
+    for i in members:
+        nz = normal[i, 2]
+        nz_sum += nz / n
+        flat += (nz > 0.85) / n
+        wall += (abs(nz) < 0.35) / n
+    f[MEAN_NORMAL_Z], f[FLAT_SHARE], f[WALL_SHARE] = nz_sum, flat, wall
+    moment = np.zeros(6)
+    for i in members:
+        a, b, c = normal[i, 0], normal[i, 1], normal[i, 2]
+        moment[0] += a * a / n
+        moment[1] += a * b / n
+        moment[2] += a * c / n
+        moment[3] += b * b / n
+        moment[4] += b * c / n
+        moment[5] += c * c / n
+    normal_shape(moment, f[NORMAL_SHAPE:NORMAL_SHAPE + 4])
+
+
+@nb.njit(cache=True)
+def _describe_slices(along: Float64Array, across: Float64Array, z: Float64Array,
+                     ends: tuple[float, float], bottom: float, f: Float32Array) -> bool:
+    """
+    Fill widths, heights and shares of voxels in slices along the long axis, narrow end first.
+
+    :param along, across, z: (n,) coordinates of the voxels; ends: the slices lie in between.
+    :return: whether the axis points to the narrow end and has to be reversed.
+    """
+    n = along.shape[0]
+    t0, t1 = ends
+    lo = np.full(SLICES, np.inf)
+    hi = np.full(SLICES, -np.inf)
+    top = np.full(SLICES, -np.inf)
+    share = np.zeros(SLICES)
+    for i in range(n):
+        b = min(SLICES - 1, max(0, int((along[i] - t0) / (t1 - t0 + 1e-9) * SLICES)))
+        lo[b], hi[b] = min(lo[b], across[i]), max(hi[b], across[i])
+        top[b] = max(top[b], z[i])
+        share[b] += 1.0 / n
+    first, last = 0.0, 0.0
+    for b in range(SLICES // 2):
+        first += max(0.0, hi[b] - lo[b])
+        last += max(0.0, hi[SLICES - 1 - b] - lo[SLICES - 1 - b])
+    reverse = first > last
+    for b in range(SLICES):
+        a = SLICES - 1 - b if reverse else b
+        if hi[a] >= lo[a]:
+            f[SLICE_WIDTH + b] = hi[a] - lo[a]
+            f[SLICE_TOP + b] = top[a] - bottom
+            f[SLICE_SHARE + b] = share[a]
+    return reverse
+
+
+@nb.njit(cache=True)
+def _circle(u: Float64Array, w: Float64Array) -> tuple[float, float]:
+    """
+    Fit a circle to plan view coordinates (n,) (Kasa 1976): cups, cans, plates, rolls.
+
+    :return: (radius, mean absolute distance from it), metres; (0, 1) where there is none.
+    """
+    uu, ww = u * u, w * w
+    den = np.sum(uu) * np.sum(ww) - np.sum(u * w) ** 2
+    radius, off = 0.0, 1.0
+    if den > 1e-12:
+        bu, bw = np.sum(u * (uu + ww)) / 2, np.sum(w * (uu + ww)) / 2
+        cu = (bu * np.sum(ww) - bw * np.sum(u * w)) / den
+        cw = (bw * np.sum(uu) - bu * np.sum(u * w)) / den
+        radius = np.sqrt(cu * cu + cw * cw + np.mean(uu + ww))
+        off = np.mean(np.abs(np.sqrt((u - cu) ** 2 + (w - cw) ** 2) - radius))
+    return radius, off
+
+
+@nb.njit(cache=True)
+def _principal_spreads(u: Float64Array, w: Float64Array, z: Float64Array,
+                       horizontal: tuple[float, float, float]) -> Float64Array:
+    """
+    Return (3,) ascending standard deviations along the principal axes of points (n,).
+
+    :param u, w: relative to their means; horizontal: their covariances (uu, uw, ww).
+    """
+    cov = np.zeros((3, 3))
+    mz = np.mean(z)
+    cov[0, 0], cov[0, 1], cov[1, 1] = horizontal
+    cov[0, 2], cov[1, 2] = np.mean(u * (z - mz)), np.mean(w * (z - mz))
+    cov[2, 2] = np.mean((z - mz) ** 2)
+    cov[1, 0], cov[2, 0], cov[2, 1] = cov[0, 1], cov[0, 2], cov[1, 2]
+    return np.sqrt(np.maximum(np.linalg.eigvalsh(cov), 0))
+
+
+@nb.njit(cache=True)
+def _describe_one(members: Int64Array, mean: Float64Array, normal: Float64Array, cell: float,
+                  frame: Float64Array, f: Float32Array) -> None:
+    """Fill the frame (FRAME_COLUMNS,) and the features (SEGMENT_FEATURES,) of one segment."""
+    n = members.shape[0]
+    x, y, z = mean[members, 0], mean[members, 1], mean[members, 2]
+    mx, my = np.mean(x), np.mean(y)
+    sxx, syy = np.mean((x - mx) ** 2), np.mean((y - my) ** 2)
+    sxy = np.mean((x - mx) * (y - my))
+    angle = 0.5 * np.arctan2(2 * sxy, sxx - syy)
+    ax, ay = np.cos(angle), np.sin(angle)
+    t, q = (x - mx) * ax + (y - my) * ay, -(x - mx) * ay + (y - my) * ax
+    t0, t1 = _spread(t, QUANTILE, 1 - QUANTILE)
+    q0, q1 = _spread(q, QUANTILE, 1 - QUANTILE)
+    z0, z1 = _spread(z, QUANTILE, 1 - QUANTILE)
+    length, breadth, height = t1 - t0 + cell, q1 - q0 + cell, z1 - z0 + cell
+    if _describe_slices(t, q, z, (t0, t1), z0, f):
+        ax, ay = -ax, -ay
+        t0, t1 = -t1, -t0
+        q0, q1 = -q1, -q0
+    frame[CENTRE_X] = mx + ax * (t0 + t1) / 2 - ay * (q0 + q1) / 2
+    frame[CENTRE_Y] = my + ay * (t0 + t1) / 2 + ax * (q0 + q1) / 2
+    frame[AXIS_X], frame[AXIS_Y], frame[LOWEST] = ax, ay, z0
+    u, w = x - mx, y - my
+    radius, off = _circle(u, w)
+    spreads = _principal_spreads(u, w, z, (sxx, sxy, syy))
+    f[LENGTH], f[BREADTH], f[HEIGHT], f[BOTTOM] = length, breadth, height, z0
+    f[AREA], f[BREADTH_RATIO] = n * cell * cell, breadth / length
+    f[HEIGHT_RATIO] = height / length
+    for k in range(3):
+        f[SPREADS + k] = spreads[k]
+    f[CIRCLE_RADIUS], f[CIRCLE_RESIDUAL] = min(radius, 1.0), off / max(radius, 1e-3)
+    f[FILL] = n * cell * cell / (length * breadth)
+    f[MEAN_HEIGHT] = np.mean(z) - z0
+    f[TOP] = z1
+    _describe_normals(normal, members, f)
+
+
+@nb.njit(cache=True)
+def describe(ids: Int32Array, n_segments: int, mean: Float64Array, normal: Float64Array,
+             cell: float) -> tuple[Float64Array, Float32Array]:
+    """
+    Describe segments, gravity aligned.
+
+    :return: frames (s, FRAME_COLUMNS) float64 and features (s, SEGMENT_FEATURES) float32, their
+        columns as named at the top of this module; lengths in metres.
+    """
+    frames = np.zeros((n_segments, FRAME_COLUMNS))
+    out = np.zeros((n_segments, SEGMENT_FEATURES), np.float32)
+    order, start = _members(ids, n_segments)
     for s in range(n_segments):
-        m = order[start[s]:start[s + 1]]
-        n = m.shape[0]
-        f = out[s]
-        x, y, z = mean[m, 0], mean[m, 1], mean[m, 2]
-        mx, my = np.mean(x), np.mean(y)
-        sxx, syy = np.mean((x - mx) ** 2), np.mean((y - my) ** 2)
-        sxy = np.mean((x - mx) * (y - my))
-        angle = 0.5 * np.arctan2(2 * sxy, sxx - syy)
-        ax, ay = np.cos(angle), np.sin(angle)
-        t, q = (x - mx) * ax + (y - my) * ay, -(x - mx) * ay + (y - my) * ax
-        t0, t1 = _spread(t, 0.01, 0.99)
-        q0, q1 = _spread(q, 0.01, 0.99)
-        z0, z1 = _spread(z, 0.01, 0.99)
-        length, breadth, height = t1 - t0 + cell, q1 - q0 + cell, z1 - z0 + cell
-        # Widths, heights and shares of the voxels in slices along the long axis.
-        lo = np.full(SLICES, np.inf)
-        hi = np.full(SLICES, -np.inf)
-        top = np.full(SLICES, -np.inf)
-        low = np.full(SLICES, np.inf)
-        share = np.zeros(SLICES)
-        flat, wall, nz_sum = 0.0, 0.0, 0.0
-        for i in range(n):
-            b = min(SLICES - 1, max(0, int((t[i] - t0) / (t1 - t0 + 1e-9) * SLICES)))
-            lo[b], hi[b] = min(lo[b], q[i]), max(hi[b], q[i])
-            top[b], low[b] = max(top[b], z[i]), min(low[b], z[i])
-            share[b] += 1.0 / n
-            nz = normal[m[i], 2]
-            nz_sum += nz / n
-            flat += (nz > 0.85) / n
-            wall += (abs(nz) < 0.35) / n
-        first, last = 0.0, 0.0
-        for b in range(SLICES // 2):
-            first += max(0.0, hi[b] - lo[b])
-            last += max(0.0, hi[SLICES - 1 - b] - lo[SLICES - 1 - b])
-        flip = first > last
-        if flip:
-            ax, ay = -ax, -ay
-            t0, t1 = -t1, -t0
-            q0, q1 = -q1, -q0
-        # Circle through the plan view (Kasa): cups, cans, plates, rolls.
-        u, w = x - mx, y - my
-        uu, ww = u * u, w * w
-        den = np.sum(uu) * np.sum(ww) - np.sum(u * w) ** 2
-        radius, off = 0.0, 1.0
-        if den > 1e-12:
-            bu, bw = np.sum(u * (uu + ww)) / 2, np.sum(w * (uu + ww)) / 2
-            cu = (bu * np.sum(ww) - bw * np.sum(u * w)) / den
-            cw = (bw * np.sum(uu) - bu * np.sum(u * w)) / den
-            radius = np.sqrt(cu * cu + cw * cw + np.mean(uu + ww))
-            off = np.mean(np.abs(np.sqrt((u - cu) ** 2 + (w - cw) ** 2) - radius))
-        frames[s, 0] = mx + ax * (t0 + t1) / 2 - ay * (q0 + q1) / 2
-        frames[s, 1] = my + ay * (t0 + t1) / 2 + ax * (q0 + q1) / 2
-        frames[s, 2], frames[s, 3], frames[s, 4] = ax, ay, z0
-        cov = np.zeros((3, 3))
-        mz = np.mean(z)
-        cov[0, 0], cov[0, 1], cov[1, 1] = sxx, sxy, syy
-        cov[0, 2], cov[1, 2] = np.mean(u * (z - mz)), np.mean(w * (z - mz))
-        cov[2, 2] = np.mean((z - mz) ** 2)
-        cov[1, 0], cov[2, 0], cov[2, 1] = cov[0, 1], cov[0, 2], cov[1, 2]
-        eig = np.sqrt(np.maximum(np.linalg.eigvalsh(cov), 0))
-        f[0], f[1], f[2], f[3] = length, breadth, height, z0
-        f[4], f[5], f[6] = n * cell * cell, breadth / length, height / length
-        f[7], f[8], f[9] = eig[0], eig[1], eig[2]
-        f[10], f[11], f[12] = nz_sum, flat, wall
-        f[13], f[14] = min(radius, 1.0), off / max(radius, 1e-3)
-        f[15] = n * cell * cell / (length * breadth)
-        f[16] = mz - z0
-        f[17] = z1
-        moment = np.zeros(6)
-        for i in m:
-            a, b, c = normal[i, 0], normal[i, 1], normal[i, 2]
-            moment[0] += a * a / n
-            moment[1] += a * b / n
-            moment[2] += a * c / n
-            moment[3] += b * b / n
-            moment[4] += b * c / n
-            moment[5] += c * c / n
-        normal_shape(moment, f[36:40])
-        for b in range(SLICES):
-            a = SLICES - 1 - b if flip else b
-            if hi[a] >= lo[a]:
-                f[18 + b] = hi[a] - lo[a]
-                f[18 + SLICES + b] = top[a] - z0
-                f[18 + 2 * SLICES + b] = share[a]
+        _describe_one(order[start[s]:start[s + 1]], mean, normal, cell, frames[s], out[s])
     return frames, out

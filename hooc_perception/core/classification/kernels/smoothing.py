@@ -2,6 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Thinning of pixels, and spreading of probabilities over the surface graph of all views."""
 
+from hooc_perception.core.arrays import (
+    AnyArray,
+    Float32Array,
+    Float64Array,
+    Int32Array,
+    Int64Array,
+    UInt8Array,
+    UInt16Array,
+)
 import numba as nb
 import numpy as np
 
@@ -9,14 +18,16 @@ SAME_SURFACE_M = 0.015
 
 
 @nb.njit(cache=True)
-def thin(camera, uv, points, stride):
+def thin(camera: UInt8Array, uv: UInt16Array, points: Float64Array,
+         stride: int) -> tuple[Int64Array, Int64Array]:
     """
-    Return (rows (k,), donor (n,)): pixels to classify, and the one that speaks for each.
+    Return (rows (k,), donor (n,)): pixels to classify, and for each pixel the one it copies.
 
     Rows are the pixels on a grid of `stride`, and those with no such pixel within `stride`
     pixels and SAME_SURFACE_M; `donor` indexes into `rows`.
 
-    :param uv: (n, 2) uint16, in row-major order within each camera.
+    :param camera: (n,) uint8; uv (n, 2) uint16, in row-major order within each camera.
+    :param points: (n, 3) float64 world, metres.
     """
     n = camera.shape[0]
     donor = np.full(n, -1, np.int64)
@@ -59,12 +70,13 @@ def thin(camera, uv, points, stride):
 
 
 @nb.njit(cache=True)
-def spread(p, voxel, n_voxels, pairs, weight, steps):
+def spread(p: Float32Array, voxel: AnyArray, n_voxels: int, pairs: Int32Array,
+           weight: Float32Array, steps: int) -> Float32Array:
     """
     Return (n_voxels, C) float32 probabilities, spread over a weighted graph.
 
     Each step replaces a voxel's distribution by the weighted mean of its neighbours' and of
-    what its own pixels say; voxels without a pixel start unknown and take their neighbours'.
+    that of its own pixels; voxels without a pixel start unknown and take their neighbours'.
 
     :param p: (k, C) float32 of pixels, voxel (k,) where they lie.
     :param pairs: (e, 2) int32; weight (e,) float32 in [0, 1].

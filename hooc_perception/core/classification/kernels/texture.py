@@ -2,15 +2,29 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bend of the surface around each voxel, at two reaches along the surface graph."""
 
+from hooc_perception.core.arrays import (
+    AnyArray,
+    Float32Array,
+    Float64Array,
+    Int32Array,
+    Int64Array,
+)
+from hooc_perception.core.kernels.linalg import eigen_jacobi
 import numba as nb
 import numpy as np
 
+# Steps of averaging along the graph after which the measures are read.
 REACHES = (3, 10)
-TEXTURE_FEATURES = 7 * len(REACHES)
+# Measures of a voxel: `normal_shape` (4), then valley, ridge and curvature.
+SHAPES, MEASURES = 4, 7
+TEXTURE_FEATURES = MEASURES * len(REACHES)
+# What is averaged: second moment of the normals (6), then valley, ridge and curvature.
+MOMENTS, VALLEY, RIDGE, CURVATURE, RAW = 6, 6, 7, 8, 9
 
 
 @nb.njit(cache=True)
-def _neighbours(m, pairs, weight):
+def _neighbours(m: int, pairs: Int32Array, weight: Float64Array
+                ) -> tuple[Int64Array, Int32Array, Float32Array]:
     """Return (start (m + 1,), other, w): the graph as neighbour lists, in the edges' order."""
     start = np.zeros(m + 1, np.int64)
     for e in range(pairs.shape[0]):
@@ -30,7 +44,8 @@ def _neighbours(m, pairs, weight):
 
 
 @nb.njit(cache=True, parallel=True)
-def _diffuse(values, start, other, w, steps):
+def _diffuse(values: Float32Array, start: Int64Array, other: Int32Array, w: Float32Array,
+             steps: int) -> Float32Array:
     """Return (m, C) after `steps` of averaging over the weighted graph, own weight 1."""
     m, n = values.shape
     now, new = values.copy(), np.empty_like(values)
@@ -49,45 +64,10 @@ def _diffuse(values, start, other, w, steps):
     return now
 
 
-@nb.njit(cache=True, error_model='numpy')
-def eigen(a, v):
-    """
-    Diagonalise a symmetric (3, 3) matrix in place; v (3, 3) gets the eigenvectors as columns.
-
-    Cyclic Jacobi rotations (Golub & Van Loan, 8.5): a call of LAPACK costs ten times as much.
-    """
-    for i in range(3):
-        for j in range(3):
-            v[i, j] = 1.0 if i == j else 0.0
-    for _ in range(12):
-        off = abs(a[0, 1]) + abs(a[0, 2]) + abs(a[1, 2])
-        if off <= 1e-12 * (abs(a[0, 0]) + abs(a[1, 1]) + abs(a[2, 2])):
-            break
-        for p in range(2):
-            for q in range(p + 1, 3):
-                if a[p, q] == 0.0:
-                    continue
-                theta = 0.5 * (a[q, q] - a[p, p]) / a[p, q]
-                t = 1.0 / (abs(theta) + np.sqrt(theta * theta + 1.0))
-                if theta < 0:
-                    t = -t
-                c = 1.0 / np.sqrt(t * t + 1.0)
-                s = t * c
-                for k in range(3):
-                    x, y = a[k, p], a[k, q]
-                    a[k, p], a[k, q] = c * x - s * y, s * x + c * y
-                for k in range(3):
-                    x, y = a[p, k], a[q, k]
-                    a[p, k], a[q, k] = c * x - s * y, s * x + c * y
-                for k in range(3):
-                    x, y = v[k, p], v[k, q]
-                    v[k, p], v[k, q] = c * x - s * y, s * x + c * y
-
-
 @nb.njit(cache=True)
-def normal_shape(tensor, out):
+def normal_shape(tensor: AnyArray, out: AnyArray) -> None:
     """
-    Fill out (4,): what the second moment of normals (xx xy xz yy yz zz) says of the shape.
+    Fill out (4,) with the shape that the second moment of normals (xx xy xz yy yz zz) indicates.
 
     The two smaller eigenvalues (plane 0 0, cylinder 0 1/2, ball 1/3 1/3), and the vertical
     components of the axis that the normals avoid and of their main direction.
@@ -96,8 +76,8 @@ def normal_shape(tensor, out):
     a[0, 0], a[0, 1], a[0, 2], a[1, 1], a[1, 2], a[2, 2] = (
         tensor[0], tensor[1], tensor[2], tensor[3], tensor[4], tensor[5])
     a[1, 0], a[2, 0], a[2, 1] = a[0, 1], a[0, 2], a[1, 2]
-    eigen(a, v)
-    low, high = 0, 0        # they stay together only where nothing is a number
+    eigen_jacobi(a, v)
+    low, high = 0, 0        # they stay equal only if nothing is a number
     for k in range(1, 3):
         low = k if a[k, k] < a[low, low] else low
         high = k if a[k, k] >= a[high, high] else high
@@ -107,23 +87,19 @@ def normal_shape(tensor, out):
 
 
 @nb.njit(cache=True, parallel=True)
-def _describe(moments, out):
-    """Fill (m, 7): `normal_shape` of the first six columns, then the other three."""
-    for i in nb.prange(moments.shape[0]):
-        normal_shape(moments[i, :6], out[i, :4])
-        for k in range(3):
-            out[i, 4 + k] = moments[i, 6 + k]
+def _measure(averages: Float32Array, out: Float32Array) -> None:
+    """Fill (m, MEASURES): `normal_shape` of the moments of (m, RAW), then the other columns."""
+    for i in nb.prange(averages.shape[0]):
+        normal_shape(averages[i, :MOMENTS], out[i, :SHAPES])
+        for k in range(RAW - MOMENTS):
+            out[i, SHAPES + k] = averages[i, MOMENTS + k]
 
 
 @nb.njit(cache=True)
-def textures(points, normals, pairs, weight):
-    """
-    Return (m, TEXTURE_FEATURES) float32 of voxels: `normal_shape`, valley, ridge, curvature.
-
-    :param points: (m, 3) and normals (m, 3); pairs (e, 2), weight (e,) in [0, 1].
-    """
+def _raw(points: Float64Array, normals: Float64Array, pairs: Int32Array) -> Float64Array:
+    """Return (m, RAW) of voxels: second moment of the normal, mean valley, ridge, curvature."""
     m = points.shape[0]
-    raw = np.zeros((m, 9), np.float64)
+    raw = np.zeros((m, RAW), np.float64)
     degree = np.full(m, 1e-6)
     for i in range(m):
         n = normals[i]
@@ -138,18 +114,29 @@ def textures(points, normals, pairs, weight):
         d = np.sqrt(d)
         bend /= d
         for i in (a, b):
-            raw[i, 6] += max(0.0, -bend)
-            raw[i, 7] += max(0.0, bend)
-            raw[i, 8] += bend / d
+            raw[i, VALLEY] += max(0.0, -bend)
+            raw[i, RIDGE] += max(0.0, bend)
+            raw[i, CURVATURE] += bend / d
             degree[i] += 1
     for i in range(m):
-        for k in range(6, 9):
+        for k in range(MOMENTS, RAW):
             raw[i, k] /= degree[i]
-    out = np.empty((m, TEXTURE_FEATURES), np.float32)
-    start, other, w = _neighbours(m, pairs, weight)
-    now, done = raw.astype(np.float32), 0
+    return raw
+
+
+@nb.njit(cache=True)
+def textures(points: Float64Array, normals: Float64Array, pairs: Int32Array,
+             weight: Float64Array) -> Float32Array:
+    """
+    Return (m, TEXTURE_FEATURES) float32 of voxels: MEASURES columns per reach.
+
+    :param points: (m, 3) and normals (m, 3); pairs (e, 2), weight (e,) in [0, 1].
+    """
+    out = np.empty((points.shape[0], TEXTURE_FEATURES), np.float32)
+    start, other, w = _neighbours(points.shape[0], pairs, weight)
+    now, done = _raw(points, normals, pairs).astype(np.float32), 0
     for r in range(len(REACHES)):
         now = _diffuse(now, start, other, w, REACHES[r] - done)
         done = REACHES[r]
-        _describe(now, out[:, 7 * r:7 * r + 7])
+        _measure(now, out[:, MEASURES * r:MEASURES * r + MEASURES])
     return out

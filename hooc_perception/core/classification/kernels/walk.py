@@ -2,20 +2,46 @@
 # SPDX-License-Identifier: Apache-2.0
 """Walks of many samples down decision trees, in lock-step to hide memory latency."""
 
+from typing import NamedTuple
+
+from hooc_perception.core.arrays import Float32Array, Int32Array, UInt8Array
 import numba as nb
 import numpy as np
 
+# Samples that walk together, and samples per parallel task.
 BLOCK = 16
+CHUNK = 512
+
+
+class Nodes(NamedTuple):
+    """
+    The nodes of trees, one after the other.
+
+    :ivar feature: (nodes,) int32 column or test that a node looks at, -1 in a leaf.
+    :ivar threshold: (nodes,) float32; a sample goes left where its value <= threshold.
+    :ivar left: (nodes,) int32 left child, the right one is `left + 1`.
+    """
+
+    feature: Int32Array
+    threshold: Float32Array
+    left: Int32Array
+
+
+class Leaves(NamedTuple):
+    """
+    The class distributions at the leaves.
+
+    :ivar row: (nodes,) int32 row of `p` for leaves; p (L, C) uint8 probability x 255.
+    """
+
+    row: Int32Array
+    p: UInt8Array
 
 
 @nb.njit(cache=True, nogil=True)
-def walk_tree(x, feature, threshold, left, root, out):
-    """
-    Fill (n,) int32 with the node in which each row of x (n, F) float32 ends.
-
-    A row goes to `left[node]` where x[feature] <= threshold and else to `left[node] + 1`;
-    `feature` < 0 marks a leaf.
-    """
+def walk_tree(x: Float32Array, nodes: Nodes, root: int, out: Int32Array) -> None:
+    """Fill out (n,) int32 with the node in which each row of x (n, F) float32 ends."""
+    feature, threshold, left = nodes.feature, nodes.threshold, nodes.left
     node = np.empty(BLOCK, np.int32)
     for start in range(0, x.shape[0], BLOCK):
         n = min(BLOCK, x.shape[0] - start)
@@ -35,30 +61,36 @@ def walk_tree(x, feature, threshold, left, root, out):
             out[start + i] = node[i]
 
 
-@nb.njit(cache=True, parallel=True)
-def predict(x, feature, threshold, left, roots, leaf, leaf_p):
-    """
-    Return (n, C) float32, the mean leaf distribution over all trees.
+@nb.njit(cache=True, nogil=True)
+def add_leaves(end: Int32Array, leaves: Leaves, out: Float32Array) -> None:
+    """Add the distribution of the leaf end[i] to each row of out (n, C) float32."""
+    for i in range(end.shape[0]):
+        row = leaves.p[leaves.row[end[i]]]
+        for c in range(row.shape[0]):
+            out[i, c] += row[c]
 
-    :param leaf: (nodes,) int32 row of `leaf_p` for leaves.
-    :param leaf_p: (L, C) uint8, probability x 255.
-    """
-    n, n_classes = x.shape[0], leaf_p.shape[1]
-    out = np.zeros((n, n_classes), np.float32)
-    chunk = 512
-    for b in nb.prange((n + chunk - 1) // chunk):
-        lo, hi = b * chunk, min(n, (b + 1) * chunk)
+
+@nb.njit(cache=True, nogil=True)
+def normalize(out: Float32Array) -> None:
+    """Scale each row of out (n, C) float32 to a sum of 1."""
+    for i in range(out.shape[0]):
+        total = np.float32(0.0)
+        for c in range(out.shape[1]):
+            total += out[i, c]
+        for c in range(out.shape[1]):
+            out[i, c] /= total
+
+
+@nb.njit(cache=True, parallel=True)
+def predict(x: Float32Array, nodes: Nodes, roots: Int32Array, leaves: Leaves) -> Float32Array:
+    """Return (n, C) float32, the mean leaf distribution of x (n, F) over all trees."""
+    n = x.shape[0]
+    out = np.zeros((n, leaves.p.shape[1]), np.float32)
+    for b in nb.prange((n + CHUNK - 1) // CHUNK):
+        lo, hi = b * CHUNK, min(n, (b + 1) * CHUNK)
         end = np.empty(hi - lo, np.int32)
         for t in range(roots.shape[0]):
-            walk_tree(x[lo:hi], feature, threshold, left, roots[t], end)
-            for i in range(hi - lo):
-                row = leaf_p[leaf[end[i]]]
-                for c in range(n_classes):
-                    out[lo + i, c] += row[c]
-        for i in range(lo, hi):
-            total = np.float32(0.0)
-            for c in range(n_classes):
-                total += out[i, c]
-            for c in range(n_classes):
-                out[i, c] /= total
+            walk_tree(x[lo:hi], nodes, roots[t], end)
+            add_leaves(end, leaves, out[lo:hi])
+        normalize(out[lo:hi])
     return out

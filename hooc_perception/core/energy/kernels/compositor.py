@@ -10,16 +10,37 @@ entries, of which the last is always true, so that a scan down a run always ends
 where `first` is the last slot). Pixels with the same owners in the same order always show the
 same candidate, so they are merged into one with the sum of their costs; below, a pixel is
 such a merged one except in `build` and `merge`. See core/energy/compositor.py for the energy.
+
+`Lists` and `Runs` are plain tuples, not NamedTuples: `add` and `remove` are called once per flip,
+and numba takes 10 microseconds longer to recognise an argument that is a NamedTuple.
 """
 
+from typing import TypeAlias
+
+from hooc_perception.core.arrays import (
+    AnyArray,
+    BoolArray,
+    Float32Array,
+    Float64Array,
+    Int32Array,
+    Int64Array,
+)
 import numba as nb
 import numpy as np
 
+# Of the candidates: (offsets (n + 1,) int64, pixel (E,) int32, slot (E,) int32); entries
+# offsets[k]:offsets[k + 1] belong to candidate k.
+Lists: TypeAlias = tuple[Int64Array, Int32Array, Int32Array]
+# Of the pixels: (owner (S,) int32, cost (S,) float64 of each slot, start (P + 1,) int32).
+Runs: TypeAlias = tuple[Int32Array, Float64Array, Int32Array]
+
 
 @nb.njit(cache=True)
-def build(offsets, pixel, depth, cost, cost_none):
+def build(offsets: Int64Array, pixel: Int32Array, depth: Float32Array, cost: Float32Array,
+          cost_none: Float32Array,
+          ) -> tuple[Int32Array, Float32Array, Int32Array, Int32Array]:
     """
-    Sort the candidates' entries into runs of slots, one run a pixel, nearest first.
+    Sort the candidates' entries into runs of slots, one run per pixel, nearest first.
 
     :param offsets: (n + 1,) int64, entries offsets[k]:offsets[k + 1] belong to candidate k.
     :param pixel: (E,) int32 index into cost_none; a candidate names a pixel at most once.
@@ -59,8 +80,8 @@ def build(offsets, pixel, depth, cost, cost_none):
 
 
 @nb.njit(cache=True)
-def fingerprints(start, owner):
-    """Return (P,) uint64, equal for runs of equal owners."""
+def fingerprints(start: Int32Array, owner: Int32Array) -> AnyArray:
+    """Return (P,) uint64, equal for runs of equal owners (hashed in the manner of FNV-1a)."""
     out = np.empty(start.shape[0] - 1, np.uint64)
     for p in range(out.shape[0]):
         h = np.uint64(14695981039346656037)
@@ -72,14 +93,13 @@ def fingerprints(start, owner):
 
 
 @nb.njit(cache=True)
-def merge(start, owner, cost, n, kind, example):
+def merge(start: Int32Array, owner: Int32Array, cost: Float32Array, n: int, kind: Int64Array,
+          example: Int64Array) -> tuple[bool, Lists, Runs]:
     """
     Merge pixels of one kind.
 
     :param kind: (P,) int64 merged pixel of each pixel; `example` (C,) int64, one of each kind.
-    :return: whether the pixels of every kind have equal runs; offsets (n + 1,) int64, pixel
-        (E',) int32 and slot (E',) int32 of the entries of each candidate, owner (S,) int32 and
-        cost (S,) float64 of the merged slots, start (C + 1,) int32 of their runs.
+    :return: whether the pixels of every kind have equal runs; the merged Lists and Runs.
     """
     n_kinds = example.shape[0]
     new_start = np.zeros(n_kinds + 1, np.int32)
@@ -111,16 +131,18 @@ def merge(start, owner, cost, n, kind, example):
         for i in range(start[p + 1] - start[p]):
             same &= owner[start[p] + i] == new_owner[to + i]
             new_cost[to + i] += cost[start[p] + i]
-    return same, offsets[:n + 1], pixel, slot, new_owner, new_cost, new_start
+    return same, (offsets[:n + 1], pixel, slot), (new_owner, new_cost, new_start)
 
 
 @nb.njit(cache=True)
-def restart(active, owner, slot_cost, start, first, second, deltas):
+def restart(active: BoolArray, runs: Runs, first: Int32Array, second: Int32Array,
+            deltas: Float64Array) -> float:
     """
     Set first, second and deltas for the given `active`; return the sum of the shown costs.
 
     :param deltas: (n + 1,) float64, overwritten: change of the pixel costs if k flips.
     """
+    owner, slot_cost, start = runs
     deltas[:] = 0.0
     total = 0.0
     for p in range(start.shape[0] - 1):
@@ -128,7 +150,7 @@ def restart(active, owner, slot_cost, start, first, second, deltas):
         while not active[owner[t]]:
             t += 1
         first[p] = t
-        total += slot_cost[t]
+        total += float(slot_cost[t])
         for s in range(start[p], t):
             deltas[owner[s]] += slot_cost[s] - slot_cost[t]
         second[p] = t
@@ -142,8 +164,10 @@ def restart(active, owner, slot_cost, start, first, second, deltas):
 
 
 @nb.njit(cache=True)
-def add(k, offsets, pixel, slot, active, owner, slot_cost, start, first, second, deltas):
+def add(k: int, lists: Lists, runs: Runs, active: BoolArray, first: Int32Array,
+        second: Int32Array, deltas: Float64Array) -> None:
     """Switch candidate k on and update first, second and the deltas of all that share pixels."""
+    (offsets, pixel, slot), (owner, slot_cost, start) = lists, runs
     active[k] = True
     for e in range(offsets[k], offsets[k + 1]):
         p, s = pixel[e], slot[e]
@@ -169,8 +193,10 @@ def add(k, offsets, pixel, slot, active, owner, slot_cost, start, first, second,
 
 
 @nb.njit(cache=True)
-def remove(k, offsets, pixel, slot, active, owner, slot_cost, start, first, second, deltas):
+def remove(k: int, lists: Lists, runs: Runs, active: BoolArray, first: Int32Array,
+           second: Int32Array, deltas: Float64Array) -> None:
     """Switch candidate k off and update first, second and the deltas of all that share pixels."""
+    (offsets, pixel, slot), (owner, slot_cost, start) = lists, runs
     active[k] = False
     for e in range(offsets[k], offsets[k + 1]):
         p, s = pixel[e], slot[e]
@@ -201,12 +227,13 @@ def remove(k, offsets, pixel, slot, active, owner, slot_cost, start, first, seco
 
 
 @nb.njit(cache=True)
-def evaluate(members, offsets, pixel, slot, start, slot_cost, nearest):
+def evaluate(members: Int64Array, lists: Lists, runs: Runs, nearest: Int32Array) -> float:
     """
-    Return the sum of the shown costs of the subset `members` (m,) int, from nothing.
+    Return the sum of the shown costs of the subset `members` (m,) int, from scratch.
 
     :param nearest: (P,) int32 work space; afterwards the slot shown at each pixel.
     """
+    (offsets, pixel, slot), (_, slot_cost, start) = lists, runs
     n_pixels = nearest.shape[0]
     for p in range(n_pixels):
         nearest[p] = start[p + 1] - 1
@@ -217,5 +244,5 @@ def evaluate(members, offsets, pixel, slot, start, slot_cost, nearest):
                 nearest[p] = slot[e]
     total = 0.0
     for p in range(n_pixels):
-        total += slot_cost[nearest[p]]
+        total += float(slot_cost[nearest[p]])
     return total

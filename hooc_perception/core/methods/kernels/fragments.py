@@ -1,55 +1,161 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Fragments of likely objects, their alignment with a model, and how well the two agree."""
+"""
+Fragments of likely objects, their alignment with a model, and how well the two agree.
 
+Basevi & Leonardis 2016, section 4.
+"""
+
+import math
+from typing import NamedTuple
+
+from hooc_perception.core.arrays import (
+    Float32Array,
+    Float64Array,
+    Int32Array,
+    Int64Array,
+    UInt8Array,
+)
 from hooc_perception.core.methods.kernels import icp
 import numba as nb
 import numpy as np
 
+# Points nearer to a camera than this, metres, are not projected into it.
 NEAR_M = 0.05
-GLANCES = 80
+# A region wider than this many pixels is sampled in steps.
+SAMPLED_PX = 80
+FEWEST_POINTS = 6
+# A model point that no view confirms or contradicts says nothing: the worst residual.
+UNSEEN = 1.0
+# Tolerances of the coarse and the fine alignment.
+COARSE_TOLERANCE, FINE_TOLERANCE = 1e-2, 1e-3
+
+
+class Images(NamedTuple):
+    """
+    The measured depth of all views, numbered through view by view, row by row.
+
+    :ivar first: (V,) int64 where each view begins in `depth`; width, height (V,) int64.
+    :ivar K: (V, 3, 3) float64; T_camera_world (V, 4, 4) float64.
+    :ivar centre: (V, 3) float64 positions of the cameras in the world.
+    :ivar depth: (P,) float32 metres, NaN = none.
+    """
+
+    first: Int64Array
+    width: Int64Array
+    height: Int64Array
+    K: Float64Array
+    T_camera_world: Float64Array
+    centre: Float64Array
+    depth: Float32Array
+
+
+class Listed(NamedTuple):
+    """
+    The pixels with a class probability and a reading.
+
+    :ivar row: (P,) int32 row in the arrays below for every pixel of all views, or -1.
+    :ivar points: (M, 3) float64 world points, metres.
+    :ivar p: (M,) uint8 probability x 255 of the category in question.
+    """
+
+    row: Int32Array
+    points: Float64Array
+    p: UInt8Array
+
+
+class Draws(NamedTuple):
+    """
+    What is drawn at random for m fragments of one category.
+
+    :ivar pixel: (m,) int32 listed row of the central pixel.
+    :ivar half: (m,) half side of the bounding region, metres.
+    :ivar least: (m,) uint8 probability from which on a pixel is likely.
+    :ivar offset: (m,) in 0..1, where thinning begins.
+    :ivar R: (m, 3, 3) initial R_world_model; shift (m, 3) metres from the fragment's centroid.
+    :ivar scale: (m,) size of the model as a multiple of the generic one.
+    """
+
+    pixel: Int32Array
+    half: Float64Array
+    least: UInt8Array
+    offset: Float64Array
+    R: Float64Array
+    shift: Float64Array
+    scale: Float64Array
+
+
+class Rules(NamedTuple):
+    """
+    Fixed numbers of the procedure, see `core.methods.fragments.FragmentConfig`.
+
+    :ivar coarse_reach, fine_reach: farthest pairs, model units.
+    :ivar coarse_points: fragment points of the coarse passes.
+    :ivar coarse_passes, fine_passes: most iterations.
+    :ivar fewest, most: pixels that a fragment needs; points that it keeps.
+    :ivar truncation_m: largest residual.
+    :ivar score_step: every score_step-th model point is scored.
+    """
+
+    coarse_reach: float
+    fine_reach: float
+    coarse_points: int
+    coarse_passes: int
+    fine_passes: int
+    fewest: int
+    most: int
+    truncation_m: float
+    score_step: int
+
+
+class Pose(NamedTuple):
+    """A posed model: world = scale * R model + t; R (3, 3), t (3,) metres."""
+
+    scale: float
+    R: Float64Array
+    t: Float64Array
+
+
+@nb.njit(cache=True, inline='always')
+def _depth_in(T: Float64Array, x: float, y: float, z: float) -> float:
+    """Return the depth of a world point along the optical axis of a camera T_camera_world."""
+    return T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
 
 
 @nb.njit(cache=True)
-def collect(centre, half, p, least, row, first, width, height, K, T_camera_world, points, found):
+def collect(centre: Float64Array, half: float, least: int, listed: Listed, images: Images,
+            found: Int32Array) -> tuple[int, int]:
     """
-    Write the rows of the likely pixels around a 3D point to `found`.
-
-    Return how many were written and how many pixels they stand for: a region wider than
-    GLANCES pixels is looked at in steps, since a fragment is thinned in the end anyway.
+    Write the rows of the likely pixels around a 3D point to `found` (M,).
 
     In each view the bounding region is the square around the point's projection whose half
-    side is `half` metres at the point's depth; of its pixels those count that are likely and
-    whose own 3D point lies within `half` of the centre along the optical axis.
+    side is `half` metres at the point's depth. A pixel in it counts if it is likely and its own
+    3D point lies within `half` of the centre along the optical axis.
 
-    :param p: (M,) uint8 probability of the category, per listed pixel; likely is what has at
-        least `least`.
-    :param row: (P,) int32, listed pixel of every pixel of all views, or -1; `first` (views,)
-        where each view begins.
-    :param points: (M, 3) float64 world points of the listed pixels.
-    :param found: (M,) int32, written.
+    :param least: probability x 255 from which on a pixel is likely.
+    :return: (how many rows were written, how many pixels they stand for): a wide region is
+        sampled in steps, since a fragment is thinned in the end anyway.
     """
     count, pixels = 0, 0
-    for v in range(first.shape[0]):
-        T = T_camera_world[v]
+    for v in range(images.first.shape[0]):
+        T, K = images.T_camera_world[v], images.K[v]
         x = T[0, 0] * centre[0] + T[0, 1] * centre[1] + T[0, 2] * centre[2] + T[0, 3]
         y = T[1, 0] * centre[0] + T[1, 1] * centre[1] + T[1, 2] * centre[2] + T[1, 3]
-        z = T[2, 0] * centre[0] + T[2, 1] * centre[1] + T[2, 2] * centre[2] + T[2, 3]
+        z = _depth_in(T, centre[0], centre[1], centre[2])
         if z <= NEAR_M:
             continue
-        u, w = K[v, 0, 0] * x / z + K[v, 0, 2], K[v, 1, 1] * y / z + K[v, 1, 2]
-        du, dw = K[v, 0, 0] * half / z, K[v, 1, 1] * half / z
-        u_lo, u_hi = max(0, int(np.ceil(u - du))), min(width[v] - 1, int(np.floor(u + du)))
-        w_lo, w_hi = max(0, int(np.ceil(w - dw))), min(height[v] - 1, int(np.floor(w + dw)))
-        step = 1 + int(2.0 * du / GLANCES)
+        u, w = K[0, 0] * x / z + K[0, 2], K[1, 1] * y / z + K[1, 2]
+        du, dw = K[0, 0] * half / z, K[1, 1] * half / z
+        u_lo, u_hi = max(0, int(np.ceil(u - du))), min(images.width[v] - 1, int(np.floor(u + du)))
+        w_lo, w_hi = max(0, int(np.ceil(w - dw))), min(images.height[v] - 1, int(np.floor(w + dw)))
+        step = 1 + int(2.0 * du / SAMPLED_PX)
         for j in range(w_lo, w_hi + 1, step):
             for i in range(u_lo, u_hi + 1, step):
-                r = row[first[v] + j * width[v] + i]
-                if r < 0 or p[r] < least:
+                r = listed.row[images.first[v] + j * images.width[v] + i]
+                if r < 0 or listed.p[r] < least:
                     continue
-                q = points[r]
-                depth = T[2, 0] * q[0] + T[2, 1] * q[1] + T[2, 2] * q[2] + T[2, 3]
-                if abs(depth - z) <= half:
+                q = listed.points[r]
+                if abs(_depth_in(T, q[0], q[1], q[2]) - z) <= half:
                     found[count] = r
                     count += 1
                     pixels += step * step
@@ -57,8 +163,10 @@ def collect(centre, half, p, least, row, first, width, height, K, T_camera_world
 
 
 @nb.njit(cache=True)
-def thin(found, count, most, offset, points, fragment):
-    """Write every (count / most)-th point to `fragment` (most, 3); return how many."""
+def thin(found: Int32Array, count: int, offset: float, points: Float64Array,
+         fragment: Float64Array) -> int:
+    """Write evenly spaced points of found[:count] to `fragment` (most, 3); return how many."""
+    most = fragment.shape[0]
     step = max(1.0, count / most)
     n = 0
     at = offset * step
@@ -71,113 +179,153 @@ def thin(found, count, most, offset, points, fragment):
 
 
 @nb.njit(cache=True)
-def disagreement(fragment, n, cloud, normals, grid, origin, cell, margin, graph, scale, R, t,
-                 step, limit, depth, first, width, height, K, T_camera_world, C):
-    """
-    Return (forward, backward), mean truncated residuals in 0..1 of fragment and model.
-
-    Forward: distance of each fragment point to the model. Backward: of each step-th model
-    point and view that it faces, the distance along the optical axis to what was measured at
-    its pixel. Points that something nearer hides say nothing; points in front of the measured
-    surface contradict it at full weight.
-
-    :param scale: model units to metres; R, t: T_world_model after the scale.
-    :param limit: truncation, metres.
-    :param depth: (P,) float32 measured depth of all views, NaN = none.
-    :param C: (views, 3) the cameras' places in the world.
-    """
-    forward = 0.0
+def _fragment_residual(fragment: Float64Array, n: int, target: icp.TargetCloud, pose: Pose,
+                       limit: float) -> float:
+    """Return the mean distance of the first n fragment points to the model, in 0..1 of limit."""
+    R, t, scale = pose.R, pose.t, pose.scale
+    total = 0.0
     for i in range(n):
         dx, dy, dz = fragment[i, 0] - t[0], fragment[i, 1] - t[1], fragment[i, 2] - t[2]
         m, d2 = icp.nearest(
             (R[0, 0] * dx + R[1, 0] * dy + R[2, 0] * dz) / scale,
             (R[0, 1] * dx + R[1, 1] * dy + R[2, 1] * dz) / scale,
-            (R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz) / scale,
-            cloud, grid, origin, cell, margin, graph, limit / scale)
-        forward += 1.0 if m < 0 else np.sqrt(d2) * scale / limit
-    backward, seen = 0.0, 0
-    for m in range(0, cloud.shape[0], step):
-        q, n_model = cloud[m], normals[m]
-        px = scale * (R[0, 0] * q[0] + R[0, 1] * q[1] + R[0, 2] * q[2]) + t[0]
-        py = scale * (R[1, 0] * q[0] + R[1, 1] * q[1] + R[1, 2] * q[2]) + t[1]
-        pz = scale * (R[2, 0] * q[0] + R[2, 1] * q[1] + R[2, 2] * q[2]) + t[2]
-        nx = R[0, 0] * n_model[0] + R[0, 1] * n_model[1] + R[0, 2] * n_model[2]
-        ny = R[1, 0] * n_model[0] + R[1, 1] * n_model[1] + R[1, 2] * n_model[2]
-        nz = R[2, 0] * n_model[0] + R[2, 1] * n_model[1] + R[2, 2] * n_model[2]
-        for v in range(first.shape[0]):
-            if nx * (C[v, 0] - px) + ny * (C[v, 1] - py) + nz * (C[v, 2] - pz) <= 0.0:
-                continue
-            T = T_camera_world[v]
-            z = T[2, 0] * px + T[2, 1] * py + T[2, 2] * pz + T[2, 3]
-            if z <= NEAR_M:
-                continue
-            x = T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz + T[0, 3]
-            y = T[1, 0] * px + T[1, 1] * py + T[1, 2] * pz + T[1, 3]
-            i = int(np.floor(K[v, 0, 0] * x / z + K[v, 0, 2] + 0.5))
-            j = int(np.floor(K[v, 1, 1] * y / z + K[v, 1, 2] + 0.5))
-            if i < 0 or j < 0 or i >= width[v] or j >= height[v]:
-                continue
-            behind = z - depth[first[v] + j * width[v] + i]
-            if not behind <= limit:
-                continue
-            seen += 1
-            backward += min(abs(behind) / limit, 1.0)
-    return forward / max(n, 1), backward / seen if seen else 1.0
+            (R[0, 2] * dx + R[1, 2] * dy + R[2, 2] * dz) / scale, target, limit / scale)
+        total += 1.0 if m < 0 else math.sqrt(d2) * scale / limit
+    return total / max(n, 1)
+
+
+@nb.njit(cache=True, inline='always')
+def _behind_measured(images: Images, v: int, p: tuple[float, float, float]) -> float:
+    """
+    Return how far world point p lies behind what view v measured at its pixel, metres.
+
+    Negative = in front of it; NaN where the view has no reading there.
+    """
+    px, py, pz = p
+    T, K = images.T_camera_world[v], images.K[v]
+    z = _depth_in(T, px, py, pz)
+    if z <= NEAR_M:
+        return np.nan
+    x = T[0, 0] * px + T[0, 1] * py + T[0, 2] * pz + T[0, 3]
+    y = T[1, 0] * px + T[1, 1] * py + T[1, 2] * pz + T[1, 3]
+    i = int(np.floor(K[0, 0] * x / z + K[0, 2] + 0.5))
+    j = int(np.floor(K[1, 1] * y / z + K[1, 2] + 0.5))
+    if i < 0 or j < 0 or i >= images.width[v] or j >= images.height[v]:
+        return np.nan
+    return z - float(images.depth[images.first[v] + j * images.width[v] + i])
 
 
 @nb.njit(cache=True)
-def propose(drawn, half, p, least, row, points, offset, R0, shift, scale, reach, coarse, passes,
-            most, fewest, limit, score_step, cloud, normals, grid, origin, cell, margin, graph,
-            depth, first, width, height, K, T_camera_world, C):
+def _model_residual(target: icp.TargetCloud, pose: Pose, step: int, limit: float,
+                    images: Images) -> float:
+    """
+    Return the mean depth residual of the model's visible surface, in 0..1 of limit.
+
+    Of each step-th model point and view that it faces, the distance along the optical axis to
+    what was measured at its pixel. Points that something nearer hides say nothing; points in
+    front of the measured surface contradict it at full weight.
+    """
+    R, t, scale = pose.R, pose.t, pose.scale
+    total, seen = 0.0, 0
+    for m in range(0, target.points.shape[0], step):
+        q, n = target.points[m], target.normals[m]
+        px = scale * (R[0, 0] * q[0] + R[0, 1] * q[1] + R[0, 2] * q[2]) + t[0]
+        py = scale * (R[1, 0] * q[0] + R[1, 1] * q[1] + R[1, 2] * q[2]) + t[1]
+        pz = scale * (R[2, 0] * q[0] + R[2, 1] * q[1] + R[2, 2] * q[2]) + t[2]
+        nx = R[0, 0] * n[0] + R[0, 1] * n[1] + R[0, 2] * n[2]
+        ny = R[1, 0] * n[0] + R[1, 1] * n[1] + R[1, 2] * n[2]
+        nz = R[2, 0] * n[0] + R[2, 1] * n[1] + R[2, 2] * n[2]
+        for v in range(images.first.shape[0]):
+            C = images.centre[v]
+            if nx * (C[0] - px) + ny * (C[1] - py) + nz * (C[2] - pz) <= 0.0:
+                continue
+            behind = _behind_measured(images, v, (px, py, pz))
+            if not behind <= limit:
+                continue
+            seen += 1
+            total += min(abs(behind) / limit, 1.0)
+    return total / seen if seen else UNSEEN
+
+
+@nb.njit(cache=True)
+def disagreement(fragment: Float64Array, n: int, target: icp.TargetCloud, pose: Pose,
+                 rules: Rules, images: Images) -> tuple[float, float]:
+    """
+    Return (forward, backward), mean truncated residuals in 0..1 of fragment and model.
+
+    Forward: distance of the first n points of `fragment` (most, 3) to the model. Backward: depth
+    residual of the model's visible surface.
+    """
+    return (_fragment_residual(fragment, n, target, pose, rules.truncation_m),
+            _model_residual(target, pose, rules.score_step, rules.truncation_m, images))
+
+
+@nb.njit(cache=True)
+def _aligned(source: Float64Array, R: Float64Array, shift: Float64Array,
+             target: icp.TargetCloud, rules: Rules) -> tuple[Float64Array, Float64Array]:
+    """
+    Return (Q (3, 3), q (3,)) = T_model_world of a fragment, coarse passes first.
+
+    :param source: (n, 3) the fragment in model units; R, shift: where to start, see Draws.
+    """
+    n = source.shape[0]
+    middle = np.zeros(3)
+    for k in range(n):
+        for c in range(3):
+            middle[c] += source[k, c] / n
+    Q, q = np.empty((3, 3)), np.empty(3)
+    for a in range(3):
+        for b in range(3):
+            Q[a, b] = R[b, a]
+    for c in range(3):
+        q[c] = 0.0
+        for b in range(3):
+            q[c] -= Q[c, b] * (middle[b] + shift[b])
+    coarse_target = icp.TargetCloud(
+        target.points, target.normals, target.grid, target.origin, target.cell, target.margin,
+        np.zeros((target.points.shape[0], 0), np.int32))
+    icp.align(source, coarse_target, Q, q, icp.Passes(
+        max(1, n // rules.coarse_points), rules.coarse_reach, rules.coarse_passes, False,
+        COARSE_TOLERANCE))
+    icp.align(source, target, Q, q, icp.Passes(
+        1, rules.fine_reach, rules.fine_passes, True, FINE_TOLERANCE))
+    return Q, q
+
+
+@nb.njit(cache=True)
+def propose(draws: Draws, listed: Listed, target: icp.TargetCloud, images: Images,
+            rules: Rules) -> tuple[Float64Array, Float64Array, Float64Array]:
     """
     Cut out a fragment for every drawn pixel, align the model with it and score the two.
 
-    :param drawn: (m,) int32 rows of the central pixels; `half` (m,) metres; `p` (M,) uint8
-        probability of the category; `least` (m,) what counts as likely.
-    :param R0: (m, 3, 3) start, world from model; `shift` (m, 3) metres from the fragment's
-        centroid; `scale` (m,).
-    :param reach: (2,) model units, pairs of the coarse and the fine passes; `coarse`: number
-        of fragment points of the coarse passes; `passes` (2,) iterations.
-    :return: (R (m, 3, 3), t (m, 3), score (m,) in 0..1, -1 where the fragment is too small).
+    :return: R (m, 3, 3) and t (m, 3), world from scaled model; score (m,) in 0..1, -1 where the
+        fragment is too small.
     """
-    m = drawn.shape[0]
+    m = draws.pixel.shape[0]
     R, t, score = np.zeros((m, 3, 3)), np.zeros((m, 3)), np.full(m, -1.0)
-    no_graph = np.zeros((cloud.shape[0], 0), np.int32)
-    found = np.empty(points.shape[0], np.int32)
+    found = np.empty(listed.points.shape[0], np.int32)
+    fragment = np.empty((rules.most, 3))
     for i in range(m):
-        count, pixels = collect(points[drawn[i]], half[i], p, least[i], row, first, width,
-                                height, K, T_camera_world, points, found)
-        if pixels < fewest or count < 6:
+        count, pixels = collect(listed.points[draws.pixel[i]], draws.half[i], draws.least[i],
+                                listed, images, found)
+        if pixels < rules.fewest or count < FEWEST_POINTS:
             continue
-        fragment = np.empty((most, 3))
-        n = thin(found, count, most, offset[i], points, fragment)
+        n = thin(found, count, draws.offset[i], listed.points, fragment)
         # Align in the model's own units: the fragment shrinks instead of the model growing.
-        source = np.empty((n, 3))
-        middle = np.zeros(3)
-        for k in range(n):
-            for c in range(3):
-                source[k, c] = fragment[k, c] / scale[i]
-                middle[c] += source[k, c] / n
-        Q, q = np.empty((3, 3)), np.empty(3)
-        for a in range(3):
-            for b in range(3):
-                Q[a, b] = R0[i, b, a]
+        scale = draws.scale[i]
+        source, shift = np.empty((n, 3)), np.empty(3)
         for c in range(3):
-            q[c] = 0.0
-            for b in range(3):
-                q[c] -= Q[c, b] * (middle[b] + shift[i, b] / scale[i])
-        icp.align(source, max(1, n // coarse), cloud, normals, grid, origin, cell, margin,
-                  no_graph, Q, q, reach[0], passes[0], False, 1e-2)
-        icp.align(source, 1, cloud, normals, grid, origin, cell, margin, graph, Q, q, reach[1],
-                  passes[1], True, 1e-3)
+            for k in range(n):
+                source[k, c] = fragment[k, c] / scale
+            shift[c] = draws.shift[i, c] / scale
+        Q, q = _aligned(source, draws.R[i], shift, target, rules)
         for a in range(3):
             for b in range(3):
                 R[i, a, b] = Q[b, a]
         for a in range(3):
             for b in range(3):
-                t[i, a] -= scale[i] * R[i, a, b] * q[b]
-        forward, backward = disagreement(
-            fragment, n, cloud, normals, grid, origin, cell, margin, graph, scale[i], R[i], t[i],
-            score_step, limit, depth, first, width, height, K, T_camera_world, C)
+                t[i, a] -= scale * R[i, a, b] * q[b]
+        forward, backward = disagreement(fragment, n, target, Pose(scale, R[i], t[i]), rules,
+                                         images)
         score[i] = 1.0 - 0.5 * (forward + backward)
     return R, t, score

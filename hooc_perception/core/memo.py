@@ -1,15 +1,17 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Remember what is derived from a generic model for as long as the model lives."""
+"""Remember what is derived from generic models: the only caches of the package."""
 
-from collections.abc import Callable
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
 import functools
-from typing import TypeVar
+from typing import ParamSpec, TypeVar
 import weakref
 
 from hooc_perception.core.types import GenericModel
 
 T = TypeVar('T')
+P = ParamSpec('P')
 
 
 def per_model(derive: Callable[[GenericModel], T]) -> Callable[[GenericModel], T]:
@@ -30,3 +32,29 @@ def per_model(derive: Callable[[GenericModel], T]) -> Callable[[GenericModel], T
         return known[key]
 
     return remembered
+
+
+def latest(count: int,
+           key: Callable[P, Hashable]) -> Callable[[Callable[P, T]], Callable[P, T]]:
+    """
+    Decorate a function so that its results for the latest `count` keys are kept.
+
+    For worker processes, which get equal but not identical models with every task.
+
+    :param key: returns a hashable key of the arguments; equal keys must mean equal results.
+    """
+    def decorate(make: Callable[P, T]) -> Callable[P, T]:
+        known: OrderedDict[Hashable, T] = OrderedDict()
+
+        @functools.wraps(make)
+        def remembered(*args: P.args, **kwargs: P.kwargs) -> T:
+            of = key(*args, **kwargs)
+            if of not in known:
+                while len(known) >= count:
+                    known.popitem(last=False)
+                known[of] = make(*args, **kwargs)
+            return known[of]
+
+        return remembered
+
+    return decorate

@@ -1,24 +1,27 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Cut a mesh into convex pieces for physics, by planes that leave the least empty hull."""
+"""Cut a mesh into convex pieces for physics, by planes that minimise the air in the hulls."""
 
+from hooc_perception.core.arrays import Float64Array
 import manifold3d
 import numpy as np
+import trimesh
 
 MAX_PIECES = 24
-# A piece is convex enough when its hull holds this share of air, or so little air in all.
+# A piece is convex enough if its hull has less than this share of air, or if the air is less
+# than this share of the whole mesh.
 AIR_SHARE = 0.12
 AIR_OF_WHOLE = 0.006
 
 
-def convex_pieces(solid, max_pieces=MAX_PIECES):
+def convex_pieces(solid: trimesh.Trimesh, max_pieces: int = MAX_PIECES) -> list[Float64Array]:
     """
     Return a list of (n, 3) float64 hull vertices that together cover a mesh, metres.
 
-    The piece with most air in its hull is cut in two, again and again, by the plane across
-    one of its axes that leaves the least air; a cup needs about 20, a box one.
+    The piece with most air in its hull is cut in two repeatedly, by the plane across one of
+    its axes that leaves the least air; a cup needs about 20 pieces, a box one.
 
-    :param solid: watertight trimesh.Trimesh; other meshes are taken as their convex hull.
+    :param solid: watertight; other meshes are replaced by their convex hull.
     """
     whole = manifold3d.Manifold(manifold3d.Mesh(
         np.asarray(solid.vertices, np.float32), np.asarray(solid.faces, np.uint32)))
@@ -42,15 +45,15 @@ def convex_pieces(solid, max_pieces=MAX_PIECES):
 
 
 class _Piece:
-    """A part of the solid, its hull, and how much air the hull holds."""
+    """A part of the solid, its hull, and the volume of air in the hull."""
 
-    def __init__(self, part):
+    def __init__(self, part: manifold3d.Manifold) -> None:
         self.part, self.hull = part, part.hull()
         self.hull_volume = self.hull.volume()
         self.air = self.hull_volume - part.volume()
 
-    def cut(self):
-        """Return the parts on both sides of the best of nine planes, [] where none cuts."""
+    def cut(self) -> list['_Piece']:
+        """Return the parts on both sides of the best of the tried planes, [] if none cuts."""
         box = np.array(self.part.bounding_box())
         low, high = box[:3], box[3:]
         best, least = [], np.inf

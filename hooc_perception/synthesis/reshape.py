@@ -1,23 +1,29 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Turn a generic model into a thing that somebody might own: same kind, other proportions.
+Turn a generic model into a plausible real object: same kind, other proportions.
 
 Section 7 of Basevi & Leonardis 2016 names the mismatch between generic and real shapes as a
 limit, and perturbed training geometry as a remedy. A `Warp` moves points, so the same one
-serves a mesh and the convex pieces that physics uses for it. Moving vertices never opens a
-closed mesh.
+applies to a mesh and to its convex pieces for physics. Moving vertices never opens a closed
+mesh.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
+from hooc_perception.core.arrays import AnyArray, Float64Array
 from hooc_perception.core.geometry import matrix_from_pose, transform
 import numpy as np
 from scipy.spatial.transform import Rotation
 import trimesh
 
-# Two cups of one kind differ by about this much, as logarithms of their sides: overall, and
-# each side on its own. Household ware of one category comes in sizes 1 : 1.5 or so.
+if TYPE_CHECKING:
+    from hooc_perception.synthesis.scatter import PlacedObject
+
+# Standard deviations between two objects of one kind, as logarithms of their sides: overall, and
+# per side. Household objects of one category vary in size by about 1 : 1.5.
 SIZE_SPREAD = 0.12
 ASPECT_SPREAD = 0.12
 TAPER_SPREAD = 0.08
@@ -30,27 +36,27 @@ class Warp:
     """
     A smooth map of model space.
 
-    :ivar low: (3,) lower corner of the box it was drawn for; `extents` (3,) its sides, metres.
+    :ivar low: (3,) lower corner of the mesh's bounding box; `extents` (3,) its sides, metres.
     :ivar scale: (3,) factor along each axis.
     :ivar axis: the axis along which taper and bend act.
     :ivar taper: (3,) relative growth of each axis from one end of `axis` to the other.
-    :ivar bend: (3,) shift of both ends over the middle, metres.
+    :ivar bend: (3,) shift of both ends relative to the middle, metres.
     :ivar lattice: (4, 4, 4, 3) shifts of the control points, metres (free-form deformation
         after Sederberg & Parry 1986).
-    :ivar offset: (3,) what is subtracted at last.
+    :ivar offset: (3,) subtracted at the end.
     """
 
-    low: np.ndarray
-    extents: np.ndarray
-    scale: np.ndarray
+    low: Float64Array
+    extents: Float64Array
+    scale: Float64Array
     axis: int
-    taper: np.ndarray
-    bend: np.ndarray
-    lattice: np.ndarray
-    offset: np.ndarray
+    taper: Float64Array
+    bend: Float64Array
+    lattice: Float64Array
+    offset: Float64Array
 
-    def __call__(self, points):
-        """Return points (n, 3) float64 of model space, moved."""
+    def __call__(self, points: Float64Array) -> Float64Array:
+        """Return warped points (n, 3) float64 of model space."""
         middle = self.low + 0.5 * self.extents
         unit = (points - self.low) / self.extents
         shift = np.zeros(points.shape)
@@ -64,13 +70,14 @@ class Warp:
         return moved * self.scale + middle - self.offset
 
 
-def random_warp(vertices, rng, strength=1.0, symmetry=None):
+def random_warp(vertices: Float64Array, rng: np.random.Generator, strength: float = 1.0,
+                symmetry: AnyArray | None = None) -> Warp:
     """
     Return a Warp that puts the bounding-box centre of the moved `vertices` (V, 3) at 0.
 
     :param strength: 0 = none, 1 = as much as real objects differ.
-    :param symmetry: (3,) axis orders as in GenericModel, or None. What is turned on a lathe
-        stays round: the two axes across share their scale, and little else is bent.
+    :param symmetry: (3,) axis orders as in GenericModel, or None. A round object stays round:
+        the two axes across share their scale, and it is bent only a little.
     """
     low = vertices.min(axis=0)
     # Sheets have a side of length 0; a millimetre keeps the unit cube well defined.
@@ -100,9 +107,11 @@ def random_warp(vertices, rng, strength=1.0, symmetry=None):
     return replace(warp, offset=0.5 * (moved.min(axis=0) + moved.max(axis=0)))
 
 
-def reshape(vertices, faces, rng, strength=1.0, symmetry=None, detail_loss=0.3):
+def reshape(vertices: Float64Array, faces: AnyArray, rng: np.random.Generator,
+            strength: float = 1.0, symmetry: AnyArray | None = None,
+            detail_loss: float = 0.3) -> tuple[Float64Array, Float64Array, Warp]:
     """
-    Return (vertices (V, 3) centred, extents (3,), Warp) of a random relative of a mesh.
+    Return (vertices (V, 3) centred, extents (3,), Warp) of a random variant of a mesh.
 
     :param vertices: (V, 3) float64 in model axes, metres; `faces` (F, 3) stay valid.
     :param detail_loss: chance that fine detail is smoothed away, for meshes that have any.
@@ -118,8 +127,9 @@ def reshape(vertices, faces, rng, strength=1.0, symmetry=None, detail_loss=0.3):
     return moved, moved.max(axis=0) - moved.min(axis=0), warp
 
 
-def reshape_placed(placed, rng, strength, symmetry=None):
-    """Return the PlacedObject reshaped where it stands, its lowest point at the old height."""
+def reshape_placed(placed: 'PlacedObject', rng: np.random.Generator, strength: float,
+                   symmetry: AnyArray | None = None) -> 'PlacedObject':
+    """Return the object reshaped in place, its lowest point at the old height."""
     R = Rotation.from_quat(placed.rotation_xyzw).as_matrix()
     in_model = (placed.vertices_world - placed.translation) @ R
     moved, size, _ = reshape(in_model, placed.faces, rng, strength, symmetry)
@@ -130,12 +140,12 @@ def reshape_placed(placed, rng, strength, symmetry=None):
     return replace(placed, translation=translation, size=size, vertices_world=world)
 
 
-def _clipped(rng, shape):
-    """Return normal draws held within 2.2 standard deviations: no freaks."""
+def _clipped(rng: np.random.Generator, shape: int | Sequence[int]) -> Float64Array:
+    """Return normal draws clipped to 2.2 standard deviations, without outliers."""
     return np.clip(rng.standard_normal(shape), -2.2, 2.2)
 
 
-def _bernstein(t):
+def _bernstein(t: Float64Array) -> Float64Array:
     """Return (n, 4) cubic Bernstein weights."""
     s = 1 - t
     return np.stack([s ** 3, 3 * t * s ** 2, 3 * t ** 2 * s, t ** 3], axis=1)

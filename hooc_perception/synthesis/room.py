@@ -1,16 +1,17 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""What stands around the objects: a table of finite size, a floor and the walls of a room."""
+"""The surroundings of the objects: a table of finite size, a floor and the walls of a room."""
 
 from dataclasses import dataclass
 
+from hooc_perception.core.arrays import Float64Array, Int32Array
 from hooc_perception.core.config import Config, param
 import numpy as np
 
 
 @dataclass(frozen=True)
 class RoomConfig(Config):
-    """Ranges that the table and the room are drawn from; lengths in metres."""
+    """Ranges from which the table and the room are drawn; lengths in metres."""
 
     table_low: float = param(1.2, 'Shortest side of the table.', 'm', 0.3, 20.0)
     table_high: float = param(1.8, 'Longest side of the table.', 'm', 0.3, 20.0)
@@ -22,20 +23,20 @@ class RoomConfig(Config):
 @dataclass(frozen=True)
 class Room:
     """
-    A drawn table and room.
+    A random table and room.
 
-    :ivar sides: (2,) table's sides, metres; `centre` (2,) world; `yaw` radians.
-    :ivar floor: height of the floor, metres, negative; NaN where there is none.
+    :ivar sides: (2,) of the table, metres; `centre` (2,) world; `yaw` radians.
+    :ivar floor: height of the floor, metres, negative; NaN without a floor.
     :ivar walls: (4,) distances of the walls -x, +x, -y, +y from the origin, metres.
     """
 
-    sides: np.ndarray
-    centre: np.ndarray
+    sides: Float64Array
+    centre: Float64Array
     yaw: float
     floor: float
-    walls: np.ndarray
+    walls: Float64Array
 
-    def meshes(self):
+    def meshes(self) -> list[tuple[Float64Array, Int32Array]]:
         """Return [(vertices (V, 3) float64 world, faces (F, 3) int32), ...], finely tiled."""
         turn = np.array([[np.cos(self.yaw), np.sin(self.yaw), 0],
                          [-np.sin(self.yaw), np.cos(self.yaw), 0]])
@@ -54,7 +55,7 @@ class Room:
         return [tiled_quad(*quad) for quad in quads]
 
 
-def draw_room(rng, config=RoomConfig()):
+def draw_room(rng: np.random.Generator, config: RoomConfig = RoomConfig()) -> Room:
     """Return a random Room."""
     sides = rng.uniform(config.table_low, config.table_high, 2)
     floor = np.nan if rng.random() < config.empty else -rng.uniform(0.6, 1.0)
@@ -62,11 +63,12 @@ def draw_room(rng, config=RoomConfig()):
                 floor, rng.uniform(1.6, 4.0, 4))
 
 
-def tiled_quad(corner, edge_a, edge_b, step):
+def tiled_quad(corner: Float64Array, edge_a: Float64Array, edge_b: Float64Array,
+               step: float) -> tuple[Float64Array, Int32Array]:
     """
     Return (vertices, faces) of a parallelogram cut into tiles of about `step` metres.
 
-    Tiled, because the renderer leaves out triangles that reach behind the camera.
+    Tiled, because the renderer skips triangles that reach behind the camera.
     """
     na = max(1, int(np.ceil(np.linalg.norm(edge_a) / step)))
     nb = max(1, int(np.ceil(np.linalg.norm(edge_b) / step)))

@@ -1,18 +1,22 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The paper's training scenes: some of the generic models, upright, close together, apart.
+The paper's training scenes: some of the generic models, upright, close but not overlapping.
 
 Section 4 of Basevi & Leonardis 2016: random subsets of the models at random places without
-physical overlap. How close, the paper does not say; here they are packed as on its table.
+physical overlap. The paper does not say how close; here they are as dense as on its table.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 import zlib
 
 import fcl
+from hooc_perception.core.arrays import AnyArray, Float64Array, Int32Array
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import posed_vertices
+from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
 import numba as nb
 import numpy as np
@@ -22,10 +26,10 @@ from scipy.spatial.transform import Rotation
 
 @dataclass(frozen=True)
 class ScatterConfig(Config):
-    """How many objects a scattered scene holds and how near they stand."""
+    """How many objects a scattered scene has and how close they are."""
 
-    objects_low: int = param(5, 'Fewest objects of a scene.', '', 0, 200)
-    objects_high: int = param(20, 'Most objects of a scene.', '', 1, 200)
+    objects_low: int = param(5, 'Fewest objects in a scene.', '', 0, 200)
+    objects_high: int = param(20, 'Most objects in a scene.', '', 1, 200)
     repeats: int = param(1, 'Most objects of one category in a scene.', '', 1, 50)
     pose: str = param('upright', 'Model z axis up (upright) or a stable resting pose of the '
                       'model (resting); the yaw is free in both.',
@@ -34,7 +38,7 @@ class ScatterConfig(Config):
                                "over its model's; 0 = the model's own.", '', 0.0, 0.5)
     crowding: float = param(0.90, 'Share of the occupied disc that footprints would cover; '
                             'large = close together.', '', 0.02, 1.5)
-    tries: int = param(40, 'Places tried for an object before it is left out.', '', 1, 1000)
+    tries: int = param(40, 'Places tried for an object before it is skipped.', '', 1, 1000)
 
 
 @dataclass(frozen=True)
@@ -50,38 +54,40 @@ class PlacedObject:
     """
 
     category: int
-    translation: np.ndarray
-    rotation_xyzw: np.ndarray
-    size: np.ndarray
-    vertices_world: np.ndarray
-    faces: np.ndarray
+    translation: Float64Array
+    rotation_xyzw: Float64Array
+    size: Float64Array
+    vertices_world: Float64Array
+    faces: Int32Array
 
 
-def models_key(models):
-    """Return a hashable key of what the meshes of a GenericModel sequence are."""
-    return tuple((m.name, zlib.crc32(np.ascontiguousarray(m.vertices)),
-                  zlib.crc32(np.ascontiguousarray(m.faces))) for m in models)
+def models_key(models: Sequence[GenericModel]) -> tuple[tuple[str, int, int], ...]:
+    """Return a hashable key of the names and meshes of models."""
+    return tuple((m.name, zlib.crc32(np.ascontiguousarray(m.vertices).tobytes()),
+                  zlib.crc32(np.ascontiguousarray(m.faces).tobytes())) for m in models)
 
 
 class Scatterer:
     """
     Draws scattered scenes of the same models; keeps their collision shapes between scenes.
 
-    Sizes come in nine steps between -2 and +2 standard deviations, so that collision shapes
-    are built once a step and model, not once a scene.
+    Sizes have nine steps between -2 and +2 standard deviations, so that collision shapes are
+    built once per step and model, not once per scene.
     """
 
-    def __init__(self, models, config=ScatterConfig()):
-        """Raise HoocError where there are no models or the range of counts is empty."""
+    def __init__(self, models: Sequence[GenericModel],
+                 config: ScatterConfig = ScatterConfig()) -> None:
+        """Raise HoocError if there are no models or the range of counts is empty."""
         if not models:
-            raise HoocError('a training scene needs at least one model, but there are none')
+            raise HoocError('a training scene needs at least one model, but there are none; '
+                            'add categories to the set')
         if config.objects_low > config.objects_high:
             raise HoocError(f'objects_low is {config.objects_low}, above objects_high '
-                            f'{config.objects_high}')
+                            f'{config.objects_high}; lower it')
         self.models, self.config = tuple(models), config
-        self._shapes = {}
+        self._shapes: dict[tuple[int, int], Any] = {}
 
-    def _shape(self, index, step, scale):
+    def _shape(self, index: int, step: int, scale: float) -> Any:
         """Return the cached fcl shape of a model at one size step."""
         key = (index, step)
         if key not in self._shapes:
@@ -93,8 +99,8 @@ class Scatterer:
             self._shapes[key] = bvh
         return self._shapes[key]
 
-    def scene(self, rng):
-        """Return a list of PlacedObject, free of overlap, bottoms at z = 0, around (0, 0)."""
+    def scene(self, rng: np.random.Generator) -> list[PlacedObject]:
+        """Return objects without overlap, bottoms at z = 0, around (0, 0)."""
         config = self.config
         count = int(rng.integers(config.objects_low, config.objects_high + 1))
         names = np.tile(np.arange(len(self.models)), config.repeats)
@@ -105,17 +111,18 @@ class Scatterer:
             scales = np.exp(0.5 * steps * config.size_spread)
         drafts = [self._draft(i, step, scale, rng)
                   for i, step, scale in zip(chosen, steps, scales)]
-        # The disc's area is the sum of the footprints' over the share they are to cover.
+        # The area of the disc is the sum of the footprints over the share that they cover.
         area = sum(d.footprint for d in drafts)
         radius = np.sqrt(area / (np.pi * config.crowding)) * rng.uniform(0.8, 1.25)
-        placed = []
-        # Large things first: small ones still find room between them.
+        placed: list[_Draft] = []
+        # Large objects first: small ones still find room between them.
         for draft in sorted(drafts, key=lambda d: -d.footprint):
             if self._place(draft, placed, radius, rng):
                 placed.append(draft)
         return [draft.placed(self.models) for draft in placed]
 
-    def _draft(self, index, step, scale, rng):
+    def _draft(self, index: int, step: int, scale: float, rng: np.random.Generator) -> '_Draft':
+        """Return an object with a random rotation, not placed yet."""
         model = self.models[index]
         rotation = Rotation.from_euler('z', rng.uniform(-np.pi, np.pi))
         if self.config.pose == 'resting' and len(model.rest_rotations):
@@ -124,10 +131,11 @@ class Scatterer:
             rotation = rotation * Rotation.from_quat(model.rest_rotations[row])
         return _Draft(int(index), scale, rotation, model, self._shape(index, step, scale))
 
-    def _place(self, draft, placed, radius, rng):
-        """Find a free place for the draft; return whether there is one."""
+    def _place(self, draft: '_Draft', placed: Sequence['_Draft'], radius: float,
+               rng: np.random.Generator) -> bool:
+        """Move the draft to a free place; return whether there is one."""
         for attempt in range(self.config.tries):
-            # The disc grows a little with every try, so that nearly everything finds room.
+            # The disc grows a little with every try, so that nearly every object finds room.
             r = radius * (1 + 0.7 * attempt / self.config.tries) * np.sqrt(rng.random())
             angle = rng.uniform(0, 2 * np.pi)
             draft.move(r * np.cos(angle), r * np.sin(angle))
@@ -137,9 +145,10 @@ class Scatterer:
 
 
 class _Draft:
-    """An object on its way to a place: fcl object, oriented mesh, bounding box."""
+    """An object that is being placed: fcl object, oriented mesh, bounding box."""
 
-    def __init__(self, index, scale, rotation, model, bvh):
+    def __init__(self, index: int, scale: float, rotation: Rotation, model: GenericModel,
+                 bvh: Any) -> None:
         self.index, self.scale, self.rotation = index, scale, rotation
         self.faces = model.faces
         self.turned = (model.vertices * scale) @ rotation.as_matrix().T
@@ -148,15 +157,16 @@ class _Draft:
         self.footprint = ConvexHull(self.turned[:, :2], qhull_options='QJ').volume
         self.size = model.extents * scale
         self.body = fcl.CollisionObject(bvh, fcl.Transform(rotation.as_matrix(), np.zeros(3)))
+        self.offset, self.centre = np.zeros(3), np.zeros(2)
 
-    def move(self, x, y):
-        """Stand the object on the table with its bounding box centred at (x, y)."""
+    def move(self, x: float, y: float) -> None:
+        """Place the object on the table with its bounding box centred at (x, y)."""
         middle = 0.5 * (self.low + self.high)
         self.offset = np.array([x - middle[0], y - middle[1], -self.low[2]])
         self.centre = np.array([x, y])
         self.body.setTransform(fcl.Transform(self.rotation.as_matrix(), self.offset))
 
-    def placed(self, models):
+    def placed(self, models: Sequence[GenericModel]) -> PlacedObject:
         """Return the finished PlacedObject."""
         model = models[self.index]
         quaternion = self.rotation.as_quat(canonical=True)
@@ -165,7 +175,7 @@ class _Draft:
                             model.faces)
 
 
-def overlapping(a, b):
+def overlapping(a: _Draft, b: _Draft) -> bool:
     """Return whether two drafts overlap: circles, boxes, surfaces, then containment."""
     if np.hypot(*(a.centre - b.centre)) > a.circle + b.circle:
         return False
@@ -175,17 +185,17 @@ def overlapping(a, b):
         return False
     if fcl.collide(a.body, b.body, fcl.CollisionRequest(), fcl.CollisionResult()):
         return True
-    # fcl meets surfaces only: one solid wholly inside another passes it unseen.
+    # fcl only tests surfaces and misses a solid that is completely inside another.
     return (inside(b.turned[0] + b.offset, a.turned + a.offset, a.faces)
             or inside(a.turned[0] + a.offset, b.turned + b.offset, b.faces))
 
 
 @nb.njit(cache=True)
-def inside(point, vertices, faces):
+def inside(point: Float64Array, vertices: Float64Array, faces: AnyArray) -> bool:
     """
-    Return whether a point (3,) lies inside a mesh: most of three rays cross it an odd number.
+    Return whether a point (3,) lies inside a mesh: two of three rays cross it an odd number.
 
-    Three directions out-vote the odd hole in a mesh that is not watertight.
+    The majority of three directions tolerates a hole in a mesh that is not watertight.
     """
     directions = ((0.021, 0.013, 1.0), (0.8, 0.31, 0.47), (-0.45, 0.83, 0.29))
     votes = 0
@@ -214,6 +224,7 @@ def inside(point, vertices, faces):
     return votes >= 2
 
 
-def scatter(models, rng, config=ScatterConfig()):
-    """Return one scattered scene, a list of PlacedObject; see Scatterer for many."""
+def scatter(models: Sequence[GenericModel], rng: np.random.Generator,
+            config: ScatterConfig = ScatterConfig()) -> list[PlacedObject]:
+    """Return one scattered scene; see Scatterer for many."""
     return Scatterer(models, config).scene(rng)

@@ -1,7 +1,7 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-What a depth camera makes of a clean depth image: noise, edges, drop-outs, glass.
+Simulate how a depth camera degrades a clean depth image: noise, edges, drop-outs, glass.
 
 Figures for the time-of-flight model (Kinect v2) follow Fankhauser et al. 2015, *Kinect v2 for
 mobile robot navigation: evaluation and modeling*, eq. for the axial noise, and Wasenmueller &
@@ -12,8 +12,10 @@ the image). Those for the structured-light model (Kinect v1) follow Nguyen et al
 Elberink 2012 (depth steps that grow with the square of the distance).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from hooc_perception.core.arrays import AnyArray, Float32Array, Float64Array, Int32Array
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
@@ -24,18 +26,18 @@ from scipy.spatial.transform import Rotation
 
 @dataclass(frozen=True)
 class SensorConfig(Config):
-    """How a simulated depth camera errs; the defaults are a Kinect v2 indoors."""
+    """Errors of a simulated depth camera; the defaults are a Kinect v2 indoors."""
 
     model: str = param('kinect_v2', 'Time of flight (kinect_v2) or structured light (kinect_v1).',
                        choices=('kinect_v2', 'kinect_v1', 'none'))
     noise_scale: float = param(1.0, 'Factor on the axial noise.', low=0.0, high=10.0)
-    lateral_px: float = param(0.35, 'Standard deviation of the place on the sensor a reading '
-                              'comes from; about 1 mm at 1 m.', 'pixels', 0.0, 3.0)
+    lateral_px: float = param(0.35, 'Standard deviation of the image position from which a '
+                              'reading comes; about 1 mm at 1 m.', 'pixels', 0.0, 3.0)
     drift_m: float = param(0.0012, 'Standard deviation of the offset that varies slowly over '
                            'the image (phase non-linearity, multipath).', 'm', 0.0, 0.05)
-    edge_m: float = param(0.03, 'Depth step between neighbours that makes an edge.', 'm',
+    edge_m: float = param(0.03, 'Depth step between neighbours that counts as an edge.', 'm',
                           0.001, 1.0)
-    flying: float = param(0.30, 'Share of edge pixels that mix fore- and background.', '',
+    flying: float = param(0.30, 'Share of edge pixels that mix foreground and background.', '',
                           0.0, 1.0)
     edge_dropout: float = param(0.20, 'Share of edge pixels without a reading.', '', 0.0, 1.0)
     random_dropout: float = param(0.006, 'Share of all pixels without a reading.', '', 0.0, 1.0)
@@ -59,50 +61,53 @@ KINECT_V1 = SensorConfig(model='kinect_v1', lateral_px=0.8, drift_m=0.0008, rang
                          range_high=6.0, edge_dropout=0.35)
 
 
-def randomised(config, rng):
+def randomised(config: SensorConfig, rng: np.random.Generator) -> SensorConfig:
     """
-    Return a copy of `config` with its figures drawn anew around their values.
+    Return a copy of `config` with values drawn around the given ones.
 
     Noise factors vary by about a third, shares by a half; a tenth of the draws are a
-    structured-light camera, so that what is learnt does not hang on one sensor.
+    structured-light camera, so that training does not depend on one sensor.
     """
     if config.model == 'none':
         return config
     base = KINECT_V1 if rng.random() < 0.1 else config
+    declared = SensorConfig.parameters()
+    drawn: dict[str, float] = {}
+    for name, value, spread in (
+            ('noise_scale', base.noise_scale, .35), ('lateral_px', base.lateral_px, .3),
+            ('drift_m', base.drift_m, .5), ('flying', base.flying, .4),
+            ('edge_dropout', base.edge_dropout, .4), ('random_dropout', base.random_dropout, .4),
+            ('signal_floor', base.signal_floor, .4), ('glass_dropout', base.glass_dropout, .3)):
+        bounds = declared[name].metadata
+        around = float(value * np.exp(spread * rng.standard_normal()))
+        drawn[name] = min(max(around, bounds['low']), bounds['high'])
+    return replace(base, **drawn)
 
-    def around(name, spread):
-        value = getattr(base, name)
-        drawn = float(value * np.exp(spread * rng.standard_normal()))
-        m = SensorConfig.__dataclass_fields__[name].metadata
-        return min(max(drawn, m['low']), m['high'])
 
-    spreads = {'noise_scale': .35, 'lateral_px': .3, 'drift_m': .5, 'flying': .4,
-               'edge_dropout': .4, 'random_dropout': .4, 'signal_floor': .4, 'glass_dropout': .3}
-    return replace(base, **{name: around(name, s) for name, s in spreads.items()})
-
-
-def smooth_field(shape, rng, cells=6):
+def smooth_field(shape: tuple[int, int], rng: np.random.Generator, cells: int = 6) -> Float32Array:
     """Return an (H, W) float32 field of unit variance whose bumps are about 1 / cells wide."""
     height, width = shape
     knots = rng.standard_normal((cells + 2, cells + 2)).astype(np.float32)
     return sensor_kernels.upsample(knots, height, width)
 
 
-def sense(depth, ids, camera, rng, config=SensorConfig(), translucent_ids=(), behind=None,
-          normals=None):
+def sense(depth: AnyArray, ids: AnyArray, camera: Camera, rng: np.random.Generator,
+          config: SensorConfig = SensorConfig(), translucent_ids: Sequence[int] = (),
+          behind: AnyArray | None = None,
+          normals: AnyArray | None = None) -> tuple[Float32Array, Int32Array]:
     """
-    Return (depth, ids) as a depth camera would give them.
+    Return (depth, ids) as measured by a depth camera.
 
-    :param depth: (H, W) float32 clean depth, metres, inf or NaN where nothing is seen.
-    :param ids: (H, W) int32, what is seen there, -1 for the surroundings or nothing.
-    :param camera: gives K; the grid may be distorted, only slopes are read from K.
-    :param translucent_ids: ids that carry the systematic error of glass.
+    :param depth: (H, W) float32 clean depth, metres, inf or NaN where there is no surface.
+    :param ids: (H, W) int32 of the visible objects, -1 for the surroundings or nothing.
+    :param camera: gives K; the image may be distorted, K is only used for slopes.
+    :param translucent_ids: ids of objects with the systematic error of glass.
     :param behind: (H, W) float32 depth of the scene without the translucent objects, or None;
         bounds how far behind its surface glass can be measured.
     :param normals: (H, W, 3) unit normals, camera frame, or None (taken from the depth).
     :return: depth (H, W) float32 metres, NaN = no reading; ids (H, W) int32 of the surface
-        that each reading comes from.
-    :raises HoocError: where the shapes disagree.
+        from which each reading comes.
+    :raises HoocError: if the shapes disagree.
     """
     if depth.shape != ids.shape or (normals is not None and normals.shape[:2] != depth.shape):
         raise HoocError(f'depth {depth.shape} and ids {ids.shape} of a simulated view differ in '
@@ -141,15 +146,10 @@ def sense(depth, ids, camera, rng, config=SensorConfig(), translucent_ids=(), be
             config.range_high, config.glass_dropout, config.quantum_m), rng)
 
 
-def simulate_kinect_v2(depth, ids, normals, camera, rng, config=SensorConfig(),
-                       translucent_ids=()):
-    """Return the depth (H, W) float32, NaN = no reading, of `sense`; see there."""
-    return sense(depth, ids, camera, rng, config, translucent_ids, normals=normals)[0]
-
-
-def miscalibrated(camera, rng, rotation_rad, translation_m):
+def miscalibrated(camera: Camera, rng: np.random.Generator, rotation_rad: float,
+                  translation_m: float) -> Camera:
     """
-    Return the camera as a slightly wrong calibration has it.
+    Return the camera with the pose of a slightly wrong calibration.
 
     :param rotation_rad: standard deviation of the rotation about each axis.
     :param translation_m: standard deviation along each axis.
@@ -162,7 +162,7 @@ def miscalibrated(camera, rng, rotation_rad, translation_m):
                   camera.distortion_model)
 
 
-def _cosine_from_normals(normals, K):
+def _cosine_from_normals(normals: AnyArray, K: Float64Array) -> Float32Array:
     """Return (H, W) float32 cosines between unit normals and the rays through the pixels."""
     h, w = normals.shape[:2]
     x = ((np.arange(w) - K[0, 2]) / K[0, 0])[None, :]

@@ -1,18 +1,27 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Labelled synthetic views of generic models: what the forest learns from."""
+"""Labelled synthetic views of generic models, the training data of the forests."""
 
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
+from hooc_perception.core.arrays import UInt8Array
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.memo import latest
 from hooc_perception.core.render import render_depth
-from hooc_perception.core.types import RectifiedView
+from hooc_perception.core.types import Camera, GenericModel, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.synthesis.reshape import reshape_placed
 from hooc_perception.synthesis.rigs import jittered_rig, random_rig, undistorted
 from hooc_perception.synthesis.room import draw_room, RoomConfig
-from hooc_perception.synthesis.scatter import models_key, ScatterConfig, Scatterer
+from hooc_perception.synthesis.scatter import (
+    models_key,
+    PlacedObject,
+    ScatterConfig,
+    Scatterer,
+)
 from hooc_perception.synthesis.sensor import miscalibrated, randomised, sense, SensorConfig
 import joblib
 import numpy as np
@@ -21,24 +30,23 @@ from tqdm import tqdm
 
 @dataclass(frozen=True)
 class TrainingConfig(Config):
-    """What training scenes look like; the defaults are the paper's."""
+    """Properties of training scenes; the defaults are the paper's."""
 
-    arrangement: str = param('scatter', 'Upright and apart (scatter: the paper) or dropped and '
-                             'at rest by physics (settled).', choices=('scatter', 'settled'))
-    reshape_strength: float = param(0.0, 'How far objects depart from the generic shape; 1 = '
-                                    'as real objects do.', '', 0.0, 3.0)
-    renders: int = param(1, 'Scenes rendered from one settled arrangement, each from another '
-                         'rig and with other noise.', '', 1, 100)
-    rig: str = param('given', 'The given cameras, the given ones moved a little, or unlike ones '
-                     'anywhere around the table.', choices=('given', 'jittered', 'random'))
+    arrangement: str = param('scatter', 'Upright without overlap (scatter: the paper) or dropped '
+                             'and at rest by physics (settled).', choices=('scatter', 'settled'))
+    reshape_strength: float = param(0.0, 'Deviation of objects from the generic shape; 1 = as '
+                                    'real objects.', '', 0.0, 3.0)
+    renders: int = param(1, 'Scenes rendered from one settled arrangement, each with another '
+                         'rig and other noise.', '', 1, 100)
+    rig: str = param('given', 'The given cameras, the same with slightly changed poses, or other '
+                     'ones anywhere around the table.', choices=('given', 'jittered', 'random'))
     cameras_low: int = param(1, 'Fewest cameras of a random rig.', '', 1, 16)
     cameras_high: int = param(4, 'Most cameras of a random rig.', '', 1, 16)
-    calibration_rad: float = param(0.0015, 'Standard deviation of the written rotation of a '
-                                   'camera from the true one, each axis.', 'rad', 0.0, 0.2)
-    calibration_m: float = param(0.0015, 'The same for its place, each axis.', 'm', 0.0, 0.2)
-    randomise_sensor: bool = param(False, "Draw the sensor's figures anew for every scene.")
-    translucent: float = param(0.0, 'Share of objects that are taken for translucent.', '',
-                               0.0, 1.0)
+    calibration_rad: float = param(0.0015, 'Standard deviation of the calibrated rotation of a '
+                                   'camera from the true one, per axis.', 'rad', 0.0, 0.2)
+    calibration_m: float = param(0.0015, 'The same for its position, per axis.', 'm', 0.0, 0.2)
+    randomise_sensor: bool = param(False, "Draw the sensor's parameters anew for every scene.")
+    translucent: float = param(0.0, 'Share of objects that are translucent.', '', 0.0, 1.0)
     scatter: ScatterConfig = param(ScatterConfig(), 'How scattered scenes are drawn.')
     sensor: SensorConfig = param(SensorConfig(), 'The simulated sensor.')
     room: RoomConfig = param(RoomConfig(), 'Table and surroundings.')
@@ -54,22 +62,23 @@ class TrainingScene:
     """
     One labelled synthetic scene.
 
-    :ivar views: RectifiedView a camera; the cameras are as a calibration would give them.
-    :ivar labels: (H, W) uint8 a view, class ids, 0 = background; also where depth is NaN.
-    :ivar objects: the PlacedObject list that was rendered.
+    :ivar views: one per camera, with the errors of a calibration.
+    :ivar labels: (H, W) uint8 class ids per view, 0 = background; also where depth is NaN.
+    :ivar objects: the rendered objects.
     """
 
-    views: tuple
-    labels: tuple
-    objects: tuple
+    views: tuple[RectifiedView, ...]
+    labels: tuple[UInt8Array, ...]
+    objects: tuple[PlacedObject, ...]
 
 
-def render_scene(objects, cameras, rng, config=TrainingConfig(), translucent=()):
+def render_scene(objects: Sequence[PlacedObject], cameras: Sequence[Camera],
+                 rng: np.random.Generator, config: TrainingConfig = TrainingConfig(),
+                 translucent: Collection[int] = ()) -> TrainingScene:
     """
     Return the TrainingScene of posed objects seen by rectified cameras.
 
-    :param objects: sequence of PlacedObject.
-    :param translucent: indices into `objects` that carry the error of glass.
+    :param translucent: indices into `objects` with the error of glass.
     """
     room = draw_room(rng, config.room).meshes()
     solid = [(o.vertices_world, o.faces) for o in objects]
@@ -86,25 +95,28 @@ def render_scene(objects, cameras, rng, config=TrainingConfig(), translucent=())
             behind = render_depth([m for i, m in enumerate(meshes) if i not in translucent],
                                   true)[0]
         ids[ids >= len(objects)] = -1
-        measured, seen = sense(depth, ids, true, rng, sensor, translucent, behind)
+        measured, seen = sense(depth, ids, true, rng, sensor, tuple(translucent), behind)
         written = miscalibrated(true, rng, config.calibration_rad, config.calibration_m)
         views.append(RectifiedView(written, measured))
         labels.append(classes[seen])
     return TrainingScene(tuple(views), tuple(labels), tuple(objects))
 
 
-def training_scene(models, cameras, rng, config=TrainingConfig(), scatterer=None,
-                   objects=None):
+def training_scene(models: Sequence[GenericModel], cameras: Sequence[Camera],
+                   rng: np.random.Generator, config: TrainingConfig = TrainingConfig(),
+                   scatterer: Scatterer | None = None,
+                   objects: Sequence[PlacedObject] | None = None) -> TrainingScene:
     """
     Return one random TrainingScene.
 
-    :param models: GenericModel sequence; class id c is models[c - 1].
-    :param cameras: Camera sequence of the set; lens distortion is ignored.
-    :param scatterer: a Scatterer of the same models, kept between calls for speed.
-    :param objects: a ready arrangement to render instead of a new one.
+    :param models: class id c is models[c - 1].
+    :param cameras: of the set; lens distortion is ignored.
+    :param scatterer: of the same models, kept between calls for speed.
+    :param objects: an existing arrangement to render instead of a new one.
     """
     if not cameras:
-        raise HoocError('training scenes need at least one camera, but there are none')
+        raise HoocError('training scenes need at least one camera, but there are none; add '
+                        'cameras to the set')
     if objects is None and config.arrangement == 'settled':
         objects = _settled(models, rng, config)
     elif objects is None:
@@ -120,13 +132,15 @@ def training_scene(models, cameras, rng, config=TrainingConfig(), scatterer=None
     return render_scene(objects, cameras, rng, config, translucent)
 
 
-def training_scenes(models, cameras, config=TrainingConfig(), seed=0, n=500, progress=False,
-                    stage='training', jobs=1):
+def training_scenes(models: Sequence[GenericModel], cameras: Sequence[Camera],
+                    config: TrainingConfig = TrainingConfig(), seed: int = 0, n: int = 500,
+                    progress: bool = False, stage: str = 'training',
+                    jobs: int = 1) -> Iterator[TrainingScene]:
     """
-    Yield n TrainingScenes; with given settings, scene k depends on (seed, stage, k) alone.
+    Yield n TrainingScenes; with given settings, scene k depends only on (seed, stage, k).
 
-    :param stage: name of the random stream: other scenes, such as those that fill the
-        leaves of a forest, take another name.
+    :param stage: name of the random stream; other scenes, such as those that fill the leaves
+        of a forest, use another name.
     :param jobs: processes; the order and the scenes are the same for any number.
     """
     settled = config.arrangement == 'settled'
@@ -134,7 +148,7 @@ def training_scenes(models, cameras, config=TrainingConfig(), seed=0, n=500, pro
     starts = range(0, n, group)
     run = joblib.delayed(_group)
     parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
-    scenes = parallel(run(tuple(models), tuple(cameras), config, seed, stage, start,
+    scenes: Any = parallel(run(tuple(models), tuple(cameras), config, seed, stage, start,
                           min(start + group, n)) for start in starts)
     with tqdm(total=n, disable=not progress, unit='scene', desc='synthetic scenes') as bar:
         for batch in scenes:
@@ -142,20 +156,14 @@ def training_scenes(models, cameras, config=TrainingConfig(), seed=0, n=500, pro
             yield from batch
 
 
-_SCATTERERS = {}
+@latest(1, key=lambda models, config: (models_key(models), config))
+def _scatterer(models: Sequence[GenericModel], config: ScatterConfig) -> Scatterer:
+    """Return this process's Scatterer of the models, so that shapes are built only once."""
+    return Scatterer(models, config)
 
 
-def _scatterer(models, config):
-    """Return this process's Scatterer of the models: collision shapes are built once."""
-    key = (models_key(models), config)
-    scatterer = _SCATTERERS.get(key)
-    if scatterer is None:
-        _SCATTERERS.clear()
-        scatterer = _SCATTERERS[key] = Scatterer(models, config)
-    return scatterer
-
-
-def _group(models, cameras, config, seed, stage, start, stop):
+def _group(models: Sequence[GenericModel], cameras: Sequence[Camera], config: TrainingConfig,
+           seed: int, stage: str, start: int, stop: int) -> list[TrainingScene]:
     """Return the scenes start..stop - 1; in a settled group they share one arrangement."""
     objects = scatterer = None
     if config.arrangement == 'settled':
@@ -166,8 +174,9 @@ def _group(models, cameras, config, seed, stage, start, stop):
                            objects) for k in range(start, stop)]
 
 
-def _settled(models, rng, config):
+def _settled(models: Sequence[GenericModel], rng: np.random.Generator,
+             config: TrainingConfig) -> list[PlacedObject]:
     """Return a settled arrangement of reshaped models."""
-    # Imported late: physics is not needed for the paper's scenes.
+    # Imported late: the paper's scenes do not need physics.
     from hooc_perception.synthesis.settle import settled_models
     return settled_models(models, rng, config.scatter, config.reshape_strength)

@@ -1,29 +1,36 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-A synthetic twin of the HOOC data set, made from our own catalogue.
+A synthetic twin of the HOOC data set, made from the built-in catalogue.
 
-What the paper's section 5 says of HOOC is built in: 25 categories, each object of a scene of
-another one, 5 scenes of 10 and 4 of 20 objects that stand close together and on one another,
-three Kinect v2 around the table, lens distortion left in, calibration a little off, real
-objects that differ from their generic models, and a jug and a glass whose depth is wrong in
-another way in every view. What it does not say (sizes of table and room, heights of the
-cameras) is set to what a laboratory would have.
+It follows section 5 of the paper: 25 categories, one object per category in a scene, 5 scenes
+of 10 and 4 of 20 objects that stand close together and on one another, three Kinect v2 around
+the table with lens distortion and small calibration errors, real objects that differ from their
+generic models, and a jug and a glass whose depth error differs in every view. What the paper
+does not state (sizes of table and room, heights of the cameras) is set to values that are
+plausible for a laboratory.
 """
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes.scene import TrueObject
 from hooc_perception.io.scenes.writer import NewScene, write_scene_set
 from hooc_perception.objects.catalogue import CATALOGUE
 from hooc_perception.objects.derive import derive
+from hooc_perception.synthesis.bodies import body_maker, BodyMaker
+from hooc_perception.synthesis.pile import SettleConfig
 from hooc_perception.synthesis.raw_views import Caster
-from hooc_perception.synthesis.rigs import ring
-from hooc_perception.synthesis.room import draw_room, RoomConfig
+from hooc_perception.synthesis.rigs import ring, RingShape
+from hooc_perception.synthesis.room import draw_room, Room, RoomConfig
+from hooc_perception.synthesis.scatter import PlacedObject
 from hooc_perception.synthesis.sensor import miscalibrated, sense, SensorConfig
-from hooc_perception.synthesis.settle import body_maker, settle, SettleConfig
+from hooc_perception.synthesis.settle import settle
 import joblib
 import numpy as np
 from tqdm import tqdm
@@ -31,13 +38,13 @@ import trimesh
 
 SCENES = {**{f'10_{i}': 10 for i in range(1, 6)}, **{f'20_{i}': 20 for i in range(1, 5)}}
 TRANSLUCENT = ('jug', 'glass')
-# A checkerboard calibration of three depth cameras leaves about this much on each axis.
+# Error per axis of a checkerboard calibration of three depth cameras.
 CALIBRATION_RAD = 0.0015
 CALIBRATION_M = 0.0015
-# People put most things down as they rest by themselves, and some on top of others.
-LAYDOWN = SettleConfig(upright=0.8, crowding=0.75, places=3, large_first=True, reach_m=0.45)
+# People place most objects in a stable pose, and some on top of others.
+PLACEMENT = SettleConfig(upright=0.8, crowding=0.75, places=3, large_first=True, reach_m=0.45)
 ROOM = RoomConfig(table_low=1.3, table_high=1.6, offset=0.03, empty=0.0)
-# Nobody annotates what no camera shows.
+# Objects that hardly any camera shows are not annotated in real sets.
 LEAST_VISIBLE = 0.08
 SURFACE_SAMPLES = 3000
 TRIES = 40
@@ -46,21 +53,21 @@ TRIES = 40
 @dataclass(frozen=True)
 class TwinOptions:
     """
-    How a set departs from HOOC.
+    Differences of a set from HOOC.
 
-    :ivar scenes: names out of SCENES, () = all.
+    :ivar scenes: names from SCENES, () = all.
     :ivar cameras: number of cameras around the table.
-    :ivar repeat: whether a category may stand in a scene more than once.
-    :ivar strength: how far objects are from their generic models; 1 = as real ones.
+    :ivar repeat: whether a scene may have several objects of one category.
+    :ivar strength: deviation of objects from their generic models; 1 = as real ones.
     """
 
-    scenes: tuple = ()
+    scenes: tuple[str, ...] = ()
     cameras: int = 3
     repeat: bool = False
     strength: float = 1.0
 
-    def __post_init__(self):
-        """Raise HoocError, naming the option, where a value makes no set."""
+    def __post_init__(self) -> None:
+        """Raise HoocError, naming the option, if a value is out of range."""
         for name in self.scenes:
             if name not in SCENES:
                 raise HoocError(f'there is no scene {name!r}; choose among {", ".join(SCENES)}')
@@ -70,12 +77,13 @@ class TwinOptions:
             raise HoocError(f'the strength is {self.strength:g}; give a number from 0 to 2')
 
 
-def write_twin(out_dir, seed=0, options=TwinOptions(), progress=False, jobs=1):
+def write_twin(out_dir: str | Path, seed: int = 0, options: TwinOptions = TwinOptions(),
+               progress: bool = False, jobs: int = 1) -> Path:
     """
-    Write a scene set in the likeness of HOOC; return its folder.
+    Write a scene set that resembles HOOC; return its folder.
 
     The same seed and options give the same bytes. A scene depends on its name, the seed and
-    the options other than `scenes`, so a chosen scene is the one of the full set.
+    the options other than `scenes`, so a selected scene equals that of the full set.
 
     :param out_dir: a folder that does not exist yet or is empty.
     :param jobs: processes, -1 = all cores; the bytes are the same for any number.
@@ -89,9 +97,9 @@ def write_twin(out_dir, seed=0, options=TwinOptions(), progress=False, jobs=1):
     room = replace(draw_room(rng, ROOM), yaw=rng.normal(0.0, 0.1))
     names = options.scenes or tuple(SCENES)
 
-    def scenes():
+    def scenes() -> Iterator[NewScene]:
         parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
-        done = parallel(joblib.delayed(_scene)(
+        done: Any = parallel(joblib.delayed(_scene)(
             name, SCENES[name], tuple(models), true_cameras, room,
             stage_rng(seed, 'twin/scene', list(SCENES).index(name)), options) for name in names)
         yield from tqdm(done, total=len(names), disable=not progress, unit='scene', desc='twin')
@@ -100,13 +108,12 @@ def write_twin(out_dir, seed=0, options=TwinOptions(), progress=False, jobs=1):
                            max_instances=0 if options.repeat else 1)
 
 
-def kinect_rig(rng, count=3):
+def kinect_rig(rng: np.random.Generator, count: int = 3) -> tuple[Camera, ...]:
     """Return `count` raw Kinect v2 depth cameras, spread evenly around the table."""
-    rig = ring(rng, count, elevation=(0.56, 0.74), distance=(1.05, 1.25), jitter=0.06,
-               names=[f'kinect{i + 1}' for i in range(count)])
+    rig = ring(rng, count, shape=RingShape((0.56, 0.74), (1.05, 1.25), 0.06), prefix='kinect')
     cameras = []
     for camera in rig:
-        # Factory calibrations of Kinect v2 depth cameras scatter by about this much.
+        # Factory calibrations of Kinect v2 depth cameras vary by about this much.
         D = np.array([0.088, -0.268, 0.0, 0.0, 0.090]) + rng.standard_normal(5) * [
             0.006, 0.012, 3e-4, 3e-4, 0.006]
         K = camera.K.copy()
@@ -115,7 +122,8 @@ def kinect_rig(rng, count=3):
     return tuple(cameras)
 
 
-def _scene(name, count, models, cameras, room, rng, options):
+def _scene(name: str, count: int, models: Sequence[GenericModel], cameras: Sequence[Camera],
+           room: Room, rng: np.random.Generator, options: TwinOptions) -> NewScene:
     """Return the NewScene of one name, with `count` objects."""
     maker = body_maker(models)
     placed, caster, visible = _arrangement(name, count, maker, cameras, room, rng, options)
@@ -134,12 +142,14 @@ def _scene(name, count, models, cameras, room, rng, options):
     return NewScene(name, tuple(depth), truth)
 
 
-def _arrangement(name, count, maker, cameras, room, rng, options):
+def _arrangement(name: str, count: int, maker: BodyMaker, cameras: Sequence[Camera], room: Room,
+                 rng: np.random.Generator, options: TwinOptions) -> tuple[
+                     list[PlacedObject], Caster, list[float]]:
     """Return (objects, their Caster, visible shares) of a pile that keeps all its objects."""
     for _ in range(TRIES):
         classes = rng.choice(len(maker.models), count, replace=options.repeat) + 1
         bodies = [maker.body(int(c), rng, options.strength) for c in classes]
-        placed = settle(bodies, rng, LAYDOWN)
+        placed = settle(bodies, rng, PLACEMENT)
         if len(placed) < count:
             continue
         caster = Caster([(o.vertices_world, o.faces) for o in placed] + room.meshes())
@@ -150,8 +160,9 @@ def _arrangement(name, count, maker, cameras, room, rng, options):
                     'tries; choose another seed')
 
 
-def surface_visibility(placed, caster, cameras, rng):
+def surface_visibility(placed: PlacedObject, caster: Caster, cameras: Sequence[Camera],
+                       rng: np.random.Generator) -> float:
     """Return the share of an object's surface that at least one camera sees (Table 1)."""
     mesh = trimesh.Trimesh(placed.vertices_world, placed.faces, process=False)
-    points, _ = trimesh.sample.sample_surface(mesh, SURFACE_SAMPLES, seed=rng)
+    points = trimesh.sample.sample_surface(mesh, SURFACE_SAMPLES, seed=rng)[0]
     return caster.seen(points, cameras).any(axis=1).mean()

@@ -11,7 +11,6 @@ from hooc_perception.synthesis.sensor import (
     randomised,
     sense,
     SensorConfig,
-    simulate_kinect_v2,
     smooth_field,
 )
 import numpy as np
@@ -78,10 +77,9 @@ def test_normals_take_the_place_of_slopes(camera):
     depth, ids = wall()
     normals = np.zeros((424, 512, 3))
     normals[..., 1:] = -np.sin(1.45), -np.cos(1.45)
-    grazing = simulate_kinect_v2(depth, ids, normals, camera, np.random.default_rng(0),
-                                 NOTHING_BUT_NOISE)
-    frontal = simulate_kinect_v2(depth, ids, None, camera, np.random.default_rng(0),
-                                 NOTHING_BUT_NOISE)
+    grazing, _ = sense(depth, ids, camera, np.random.default_rng(0), NOTHING_BUT_NOISE,
+                       normals=normals)
+    frontal, _ = sense(depth, ids, camera, np.random.default_rng(0), NOTHING_BUT_NOISE)
     assert np.nanstd(grazing[MIDDLE]) > 1.5 * np.nanstd(frontal[MIDDLE])
 
 
@@ -100,7 +98,7 @@ def test_far_grazing_surfaces_lose_readings(camera):
     depth, ids = wall(4.0)
     normals = np.zeros((424, 512, 3))
     normals[..., 1:] = -np.sin(1.3), -np.cos(1.3)
-    out = simulate_kinect_v2(depth, ids, normals, camera, np.random.default_rng(0))
+    out, _ = sense(depth, ids, camera, np.random.default_rng(0), normals=normals)
     assert np.isnan(out).mean() > 0.3
 
 

@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 from hooc_perception.errors import HoocError
 from hooc_perception.objects.manifold import to_manifold
+from hooc_perception.synthesis.bodies import Body, BodyMaker
 from hooc_perception.synthesis.convex import convex_pieces
+from hooc_perception.synthesis.pile import SettleConfig
 from hooc_perception.synthesis.scatter import ScatterConfig
-from hooc_perception.synthesis.settle import Body, BodyMaker, settle, SettleConfig, settled_models
+from hooc_perception.synthesis.settle import settle, settled_models
 import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, Delaunay

@@ -49,7 +49,7 @@ def _edit(folder, change):
     (folder / 'model.json').write_text(json.dumps(meta))
 
 
-def _refused(folder, words):
+def _rejected(folder, words):
     with pytest.raises(HoocError, match=words) as caught:
         load_model_folder(folder)
     assert '\n' not in str(caught.value)
@@ -117,12 +117,12 @@ def test_names_must_differ_as_topics(folder, models, tmp_path):
         save_model_folder(tmp_path / 'm', 'x', taken, CLASSIFIER, 'fast', 0, ())
     assert not (tmp_path / 'm').exists()
     _edit(folder, lambda meta: meta.update(categories=['can-1', 'ball', 'can_1']))
-    _refused(folder, "'can-1' and 'can_1' would share")
+    _rejected(folder, "'can-1' and 'can_1' would share")
 
 
 def test_not_a_model_folder(tmp_path):
-    _refused(tmp_path, 'not a model folder')
-    _refused(tmp_path / 'nowhere', 'not a model folder')
+    _rejected(tmp_path, 'not a model folder')
+    _rejected(tmp_path / 'nowhere', 'not a model folder')
 
 
 @pytest.mark.parametrize('text, words', [
@@ -131,30 +131,30 @@ def test_not_a_model_folder(tmp_path):
     ('{"format": "hooc-model/1", "files": 3}', 'lacks')])
 def test_garbled_meta_data(folder, text, words):
     (folder / 'model.json').write_text(text)
-    _refused(folder, words)
+    _rejected(folder, words)
 
 
 @pytest.mark.parametrize('file', ['models.npz', 'meshes/ball.ply', 'classifier/leaves.npy'])
 def test_missing_and_damaged_files(folder, file):
     data = bytearray((folder / file).read_bytes())
     (folder / file).write_bytes(data[:-1])
-    _refused(folder, 'damaged')
+    _rejected(folder, 'damaged')
     data[len(data) // 2] ^= 1
     (folder / file).write_bytes(data)
-    _refused(folder, 'checksum')
+    _rejected(folder, 'checksum')
     (folder / file).unlink()
-    _refused(folder, f'{file} is missing')
+    _rejected(folder, f'{file} is missing')
 
 
 def test_paths_out_of_the_folder(folder, tmp_path):
     for field in ('categories', 'classifier'):
         spoiled = shutil.copytree(folder, tmp_path / field)
         _edit(spoiled, lambda meta, field=field: meta[field].append('../../secret'))
-        _refused(spoiled, 'secret')
+        _rejected(spoiled, 'secret')
     outside = tmp_path / 'leaves.npy'
     shutil.move(folder / 'classifier' / 'leaves.npy', outside)
     (folder / 'classifier' / 'leaves.npy').symlink_to(outside)
-    _refused(folder, 'points outside')
+    _rejected(folder, 'points outside')
 
 
 def _replace(folder, file, write):
@@ -166,19 +166,19 @@ def _replace(folder, file, write):
         {file: {'bytes': len(data), 'sha256': hashlib.sha256(data).hexdigest()}}))
 
 
-def test_pickles_are_refused(folder, tmp_path):
+def test_pickles_are_rejected(folder, tmp_path):
     class Evil:
         def __reduce__(self):
             return (open, (str(tmp_path / 'was_run'), 'w'))
 
     _replace(folder, 'classifier/leaves.npy', lambda path: np.save(
         path, np.array([Evil()], object), allow_pickle=True))
-    _refused(folder, 'leaves.npy is not an array of plain numbers')
+    _rejected(folder, 'leaves.npy is not an array of plain numbers')
     _replace(folder, 'classifier/leaves.npy', lambda path: np.save(path, np.arange(20)))
     load_model_folder(folder)
     _replace(folder, 'models.npz', lambda path: np.savez(
         path, extents=np.array([Evil()], object)))
-    _refused(folder, 'models.npz is not what hooc train writes')
+    _rejected(folder, 'models.npz is not what hooc train writes')
     assert not (tmp_path / 'was_run').exists()
 
 
@@ -197,12 +197,12 @@ def test_arrays_that_would_lead_compiled_code_astray(folder, key, spoil):
             arrays[key] = spoil(arrays[key])
         np.savez(path, **arrays)
     _replace(folder, 'models.npz', write)
-    _refused(folder, 'models.npz is not what hooc train writes')
+    _rejected(folder, 'models.npz is not what hooc train writes')
 
 
 @pytest.mark.parametrize('content', [b'', b'PK junk', b'\x93NUMPY\x01\x00\x10\x00{"descr": 1}'])
 def test_arrays_that_are_none(folder, content):
     _replace(folder, 'classifier/leaves.npy', lambda path: path.write_bytes(content))
-    _refused(folder, 'leaves.npy')
+    _rejected(folder, 'leaves.npy')
     _replace(folder, 'models.npz', lambda path: path.write_bytes(content))
-    _refused(folder, 'models.npz')
+    _rejected(folder, 'models.npz')

@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Every error in a scene set gets one sentence that names file, field and mend."""
+"""Every error in a scene set gets one sentence that names file, field and fix."""
 
 import struct
 import zlib
@@ -42,10 +42,10 @@ def edit(file, change):
 
 
 def assert_sentence(error, *words):
-    """Assert that a message is one sentence with a mend, and names everything it must."""
+    """Assert that a message is one sentence with a fix, and names everything it must."""
     text = str(error.value)
     assert '\n' not in text
-    assert ';' in text, 'no mend'
+    assert ';' in text, 'no fix'
     for word in words:
         assert word in text
 

@@ -1,7 +1,7 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Everything that stands on the table: categories and 6D poses from depth alone.
+Categories, 6D poses and sizes of all objects on a table, from depth images alone.
 
     from hooc_perception import Camera, DepthView, Parser
 

@@ -9,7 +9,6 @@ from pathlib import Path
 import time
 from typing import Any, TYPE_CHECKING
 
-from hooc_perception.chain import PROFILES
 from hooc_perception.cli import options
 from hooc_perception.errors import HoocError
 
@@ -18,25 +17,20 @@ if TYPE_CHECKING:
     from hooc_perception.io.scenes.scene import RecordedScene
     from hooc_perception.parser import Parser
 
-HELP = 'find the objects of a scene set or a bag, in one process without ROS'
+HELP = 'Find the objects of a scene set or a bag, in one process without ROS.'
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('set', help='folder of a scene set, a BOP dataset or a bag')
-    parser.add_argument('--model', required=True, help='model folder that hooc train wrote')
     parser.add_argument('--out', required=True, help='results file to write')
-    parser.add_argument('--profile', choices=PROFILES,
-                        help='default: the profile that the model was trained for')
+    options.add_chain(parser)
     parser.add_argument('--scene', nargs='+', action='extend',
                         metavar='ID', help='only these scenes')
-    parser.add_argument('--seed', type=int, help="default: the model's")
     parser.add_argument('--true-poses', action='store_true',
                         help='setting B: the true poses are among the candidates')
     parser.add_argument('--sigmas', action='store_true',
                         help='also estimate the uncertainty of each pose')
-    parser.add_argument('--set-parameter', action='append', default=[], metavar='STAGE.NAME=VALUE',
-                        help='change one parameter of the profile; may be repeated')
     options.add_executor(parser)
 
 

@@ -107,6 +107,11 @@ class Compositor:
         """Return the energy of the current subset."""
         return self._pixel_cost + self._unary_cost
 
+    @property
+    def n_merged(self) -> int:
+        """Return the number of pixels that are left after merging those with equal candidates."""
+        return len(self._first)
+
     def reset(self, mask: BoolArray) -> None:
         """Start again from the subset `mask` (n,) bool."""
         self._active[:self.n] = mask

@@ -109,7 +109,7 @@ def test_bad_lists_are_named(change, message):
 def test_pixels_with_the_same_candidates_in_the_same_order_are_merged():
     energy = Compositor([0, 3, 6], [0, 1, 2, 1, 2, 3], [1, 1, 1, .5, .5, .5], [1, 2, 4, 8, 16, 32],
                         [64., 128, 256, 512, 1024])
-    assert len(energy._start) - 1 == 3
+    assert energy.n_merged == 3
     values = {mask: energy.evaluate(np.array(mask, bool)) for mask in (
         (0, 0), (1, 0), (0, 1), (1, 1))}
     assert values == {(0, 0): 1984, (1, 0): 1543, (0, 1): 1144, (1, 1): 1081}

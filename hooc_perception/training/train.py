@@ -8,10 +8,10 @@ returns arrays, which are stored with the classifier, and may read those of the 
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 import json
 from pathlib import Path
-from typing import Any, Protocol, TypeAlias, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from hooc_perception.core.arrays import BoolArray
 from hooc_perception.core.classification.classify import FORMAT_VERSION, KIND_FUSED, KIND_PAPER
@@ -26,6 +26,7 @@ from hooc_perception.objects.mesh import load_mesh
 from hooc_perception.synthesis.training_scenes import PAPER, training_scenes
 from hooc_perception.trained.folder import check_place, ModelFolder, save_model_folder
 from hooc_perception.training import fit_pixels
+from hooc_perception.training.context import Arrays, TrainingContext
 from hooc_perception.training.fit_forest import fit, FitConfig
 from hooc_perception.training.fit_verifier import fit_verifier, VerifierConfig
 from hooc_perception.training.fused_scenes import fused_table, FusedScenesConfig, FusedTable
@@ -34,8 +35,6 @@ import numpy as np
 from tqdm import tqdm
 
 T = TypeVar('T')
-# Arrays and numpy scalars by name, as a MODEL folder stores them.
-Arrays: TypeAlias = dict[str, Any]
 PROFILES: dict[str, tuple[Config, ...]] = {
     'paper': (fit_pixels.PixelFitConfig(),),
     'best': (FusedScenesConfig(), FitConfig(), VerifierConfig()),
@@ -90,32 +89,6 @@ class TrainingSet(Protocol):
     def max_instances(self) -> int:
         """Return the most objects of one category per scene, 0 = no limit."""
         ...
-
-
-@dataclass(frozen=True)
-class TrainingContext:
-    """
-    What a training step may read.
-
-    :ivar models: tuple of GenericModel; class id c is models[c - 1].
-    :ivar cameras: tuple of Camera of the set; `max_instances` as in SceneSet.
-    :ivar configs: the Config objects of the profile; `jobs` worker processes or threads.
-    :ivar classifier: arrays of the earlier steps.
-    """
-
-    models: tuple[GenericModel, ...]
-    cameras: tuple[Camera, ...]
-    max_instances: int
-    profile: str
-    seed: int
-    configs: tuple[Config, ...]
-    jobs: int
-    progress: bool
-    classifier: Arrays
-
-    def bar(self, total: int, what: str, unit: str) -> tqdm:
-        """Return a progress bar; call its `update(n)`."""
-        return tqdm(total=total, desc=what, unit=unit, disable=not self.progress)
 
 
 def train(scene_set: TrainingSet, out: str | Path, profile: str = 'best', seed: int = 0,

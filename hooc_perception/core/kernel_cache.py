@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where numba keeps compiled kernels, and when they are out of date."""
 
+from collections.abc import Mapping, MutableMapping
 import contextlib
 import hashlib
 import os
@@ -9,7 +10,7 @@ from pathlib import Path
 import tempfile
 
 
-def writable(folder):
+def writable(folder: str | Path) -> bool:
     """Say whether files can be made in `folder`, or in its closest ancestor that exists."""
     folder = Path(folder)
     while not folder.exists() and folder != folder.parent:
@@ -17,7 +18,7 @@ def writable(folder):
     return folder.is_dir() and os.access(folder, os.W_OK | os.X_OK)
 
 
-def private_folder(base):
+def private_folder(base: str | Path) -> Path:
     """
     Return a folder below `base` that only this user can write to.
 
@@ -37,7 +38,7 @@ def private_folder(base):
 PACKAGE = Path(__file__).resolve().parents[1]
 
 
-def prepare():
+def prepare() -> None:
     """Choose the folder of compiled kernels, drop stale ones; before numba is first imported."""
     choose()
     drop_stale()
@@ -45,7 +46,8 @@ def prepare():
     os.environ.setdefault('NUMBA_THREADING_LAYER_PRIORITY', 'omp workqueue tbb')
 
 
-def choose(environment=os.environ, package=PACKAGE, temporary=None):
+def choose(environment: MutableMapping[str, str] = os.environ, package: Path = PACKAGE,
+           temporary: str | Path | None = None) -> None:
     """
     Set NUMBA_CACHE_DIR where numba would find no place for its cache, else leave it alone.
 
@@ -58,7 +60,7 @@ def choose(environment=os.environ, package=PACKAGE, temporary=None):
         environment['NUMBA_CACHE_DIR'] = str(private_folder(temporary or tempfile.gettempdir()))
 
 
-def drop_stale(environment=os.environ, package=PACKAGE):
+def drop_stale(environment: Mapping[str, str] = os.environ, package: Path = PACKAGE) -> None:
     """
     Remove compiled kernels that were made from other sources than lie there now.
 
@@ -83,7 +85,7 @@ def drop_stale(environment=os.environ, package=PACKAGE):
         stamp.write_text(now.hexdigest())
 
 
-def _place(environment, package):
+def _place(environment: Mapping[str, str], package: Path) -> tuple[Path, tuple[str, ...]]:
     """Return (folder for a stamp, patterns below it of folders with compiled kernels)."""
     if not environment.get('NUMBA_CACHE_DIR') and writable(package):
         return package, ('**/kernels/__pycache__', 'synthesis/__pycache__')
@@ -91,6 +93,6 @@ def _place(environment, package):
     return Path(root), ('kernels_*', 'synthesis_*')
 
 
-def _home(environment):
+def _home(environment: Mapping[str, str]) -> str:
     """Return the folder of the user's caches."""
     return environment.get('XDG_CACHE_HOME') or os.path.expanduser('~/.cache')

@@ -26,7 +26,7 @@ from hooc_perception.io.bags.bag_format import (
 )
 from hooc_perception.io.bags.mcap_checks import write_checksums
 from hooc_perception.io.depth_encodings import encode_depth, METRES, MILLIMETRES
-from hooc_perception.io.scenes.scene import TrueObject
+from hooc_perception.io.scenes.scene import RecordedScene, TrueObject
 from hooc_perception.io.scenes.writer import true_object_entry
 import numpy as np
 from rosbags.interfaces import Qos
@@ -84,12 +84,16 @@ class WritableScene(Protocol):
         ...
 
 
+# pyright does not accept the cached properties of RecordedScene as properties of a protocol.
+AnyWritable = RecordedScene | WritableScene
+
+
 def optical_frame(camera_name: str) -> str:
     """Return the name of a camera's optical frame."""
     return f'{camera_name}_depth_optical_frame'
 
 
-def write_bag(scene: WritableScene, scene_set: 'SceneSet', out_dir: str | Path,
+def write_bag(scene: AnyWritable, scene_set: 'SceneSet', out_dir: str | Path,
               storage: str = 'mcap', repeat: int = 1, rate: float = 10.0) -> Path:
     """
     Write one scene as the bag out_dir/<scene> and return its path.
@@ -124,7 +128,7 @@ def write_bag(scene: WritableScene, scene_set: 'SceneSet', out_dir: str | Path,
     return path
 
 
-def scene_info(scene: WritableScene, scene_set: 'SceneSet') -> dict[str, Any]:
+def scene_info(scene: AnyWritable, scene_set: 'SceneSet') -> dict[str, Any]:
     """Return the dict that /hooc/scene_info carries as JSON."""
     truth = scene.truth
     return {'format': INFO_FORMAT, 'dataset': scene_set.name, 'scene': scene.name,
@@ -159,7 +163,7 @@ def _write(path: Path, storage: str, latched: Iterable[_Outgoing], images: Itera
         write_checksums(path / f'{path.name}.mcap')
 
 
-def _latched(scene: WritableScene, scene_set: 'SceneSet') -> Iterator[_Outgoing]:
+def _latched(scene: AnyWritable, scene_set: 'SceneSet') -> Iterator[_Outgoing]:
     """Yield the messages on latched topics, which are sent once."""
     types = TYPES.types
     transforms = [_transform(camera, scene_set.world_frame) for camera in scene.cameras]
@@ -172,7 +176,7 @@ def _latched(scene: WritableScene, scene_set: 'SceneSet') -> Iterator[_Outgoing]
                _image(labels.tobytes(), labels.shape, 'mono8', labels.shape[1], camera))
 
 
-def _images(scene: WritableScene) -> Iterator[_Outgoing]:
+def _images(scene: AnyWritable) -> Iterator[_Outgoing]:
     """Yield the messages of one frame set: every image and its CameraInfo."""
     for view, unit in zip(scene.depth(), scene.depth_units):
         topic = f'{NAMESPACE}/{view.camera.name}/depth'

@@ -7,9 +7,9 @@ import json
 import re
 import shutil
 
+from hooc_perception import parser as parser_module
 from hooc_perception.cli.main import main
 from hooc_perception.cli.overrides import overrides_of
-from hooc_perception.core import pipeline
 from hooc_perception.core.geometry import back_project
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera, PixelProbabilities
@@ -108,7 +108,7 @@ def oracle(monkeypatch):
                 row.append(value)
         return PixelProbabilities(*map(np.concatenate, rows))
 
-    monkeypatch.setattr(pipeline, 'classify', classify)
+    monkeypatch.setattr(parser_module, 'classify', classify)
 
 
 def hooc_parse(scene_set, model, out, *words):
@@ -171,7 +171,7 @@ def test_true_poses_are_among_the_candidates(annotated, model, tmp_path, monkeyp
         pools.append(pool)
         return plain(observation, probabilities, pool, *rest)
 
-    monkeypatch.setattr(pipeline, 'parse', parse)
+    monkeypatch.setattr(parser_module, 'parse', parse)
     out = tmp_path / 'b.json'
     assert hooc_parse(annotated, model, out, *CHEAP, '--true-poses') == 0
     both, none = pools
@@ -210,7 +210,7 @@ def test_a_broken_scene_does_not_cost_the_others(scene_set, model, tmp_path, cap
 
 def test_a_place_that_cannot_be_written_is_refused_before_the_work(
         scene_set, model, tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr(pipeline, 'classify', None)
+    monkeypatch.setattr(parser_module, 'classify', None)
     (tmp_path / 'file').touch()
     assert hooc_parse(scene_set, model, tmp_path) == 1
     assert f'--out {tmp_path} is a folder; name a file' in sentence(capsys)

@@ -7,6 +7,7 @@ import json
 import re
 import shutil
 
+from hooc_perception import Parser
 from hooc_perception import parser as parser_module
 from hooc_perception.cli.main import main
 from hooc_perception.cli.overrides import overrides_of
@@ -165,13 +166,13 @@ def test_scenes_are_chosen_one_by_one_as_for_other_commands(scene_set, model, tm
 
 
 def test_true_poses_are_among_the_candidates(annotated, model, tmp_path, monkeypatch):
-    pools, plain = [], pipeline.parse
+    pools, plain = [], Parser.decide
 
-    def parse(observation, probabilities, pool, *rest):
+    def decide(self, frame, pool, seed):
         pools.append(pool)
-        return plain(observation, probabilities, pool, *rest)
+        return plain(self, frame, pool, seed)
 
-    monkeypatch.setattr(parser_module, 'parse', parse)
+    monkeypatch.setattr(Parser, 'decide', decide)
     out = tmp_path / 'b.json'
     assert hooc_parse(annotated, model, out, *CHEAP, '--true-poses') == 0
     both, none = pools
@@ -264,7 +265,8 @@ def test_a_model_that_is_no_model_folder(scene_set, tmp_path, capsys, kind):
 
 @pytest.mark.parametrize('text, said', [
     ('parse.deadline=2', "no parameter 'parse.deadline'"),
-    ('parse.search=luck', 'search is .luck.; choose one of joint, genetic'),
+    ('parse.swaps=luck', 'swaps is .luck., but must be of type bool'),
+    ('parse.elite=0.1', 'parse.elite has no effect in the profile best'),
     ('parse.rounds=-1', 'rounds is -1, outside its range'),
     ('rounds=1', "'rounds=1' does not set a parameter; write STAGE.NAME=VALUE"),
     ('parse.rounds', "'parse.rounds' does not set a parameter")])

@@ -63,7 +63,7 @@ def _salvage(path: Path, out: Path) -> Path:
     for note in dict.fromkeys(found.notes):
         print(f'  {note}')
     if not found.messages:
-        raise HoocError(f'{path}: not a single message can be read; record it again')
+        raise HoocError(f'{path}: no message can be read; record it again')
     write_salvaged(found, out)
     print(f'{out}: {len(found.messages)} messages recovered')
     return out

@@ -101,11 +101,16 @@ def with_overrides(chosen: Profile, overrides: Mapping[str, Any]) -> Profile:
     return chosen
 
 
+def profiles_with(key: str) -> list[str]:
+    """Return the names of the profiles whose method has a parameter 'stage.name'."""
+    stage, _, parameter = key.partition('.')
+    return [name for name in PROFILES if stage in STAGES
+            and parameter in profile(name).stage(stage).parameters()]
+
+
 def why_not(key: str, name: str) -> str:
     """Return the sentence on a parameter 'stage.name' that the profile `name` does not have."""
-    stage, _, parameter = key.partition('.')
-    others = [other for other in PROFILES if stage in STAGES
-              and parameter in profile(other).stage(stage).parameters()]
+    others = profiles_with(key)
     if others:
         return (f'parameter {key} has no effect in the profile {name}: only the method of '
                 f'{" and ".join(others)} has it; leave it out or choose such a profile')

@@ -9,7 +9,7 @@ import importlib
 
 from hooc_perception.chain import node_class, NODES, PROFILES, STAGES
 from hooc_perception.core.config import Config
-from hooc_perception.core.profiles import profile
+from hooc_perception.core.profiles import profile, profiles_with
 
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 
@@ -43,8 +43,7 @@ def inert(given: Iterable[str], stages: Mapping[str, Config]) -> list[str]:
         if stage in stages and parameter not in stages[stage].parameters():
             wrong += [f'parameter {name} has no effect here: only the method of profile {other} '
                       'has it; leave it out or set the parameter profile'
-                      for other in PROFILES
-                      if parameter in profile(other).stage(stage).parameters()][:1]
+                      for other in profiles_with(name)[:1]]
     return wrong
 
 

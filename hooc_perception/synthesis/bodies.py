@@ -10,10 +10,14 @@ from hooc_perception.core.memo import latest
 from hooc_perception.core.types import GenericModel
 from hooc_perception.objects.repair import closed
 from hooc_perception.synthesis.convex import convex_pieces
+from hooc_perception.synthesis.population import Population, Relative
 from hooc_perception.synthesis.reshape import reshape
 from hooc_perception.synthesis.scatter import models_key
 import numpy as np
 import trimesh
+
+# Share of the objects that are made from the set's own mesh where there are relatives.
+GENERIC_SHARE = 0.3
 
 
 @dataclass(frozen=True)
@@ -26,6 +30,7 @@ class Body:
     :ivar faces: (F, 3) of the visible mesh.
     :ivar pieces: (n, 3) convex vertex sets in the same axes.
     :ivar rest_rotations: (R, 4) xyzw, may be empty.
+    :ivar fold: of the Relative that it was made from, -1 = made from the generic model.
     """
 
     category: int
@@ -33,14 +38,19 @@ class Body:
     faces: Int32Array
     pieces: list[Float64Array]
     rest_rotations: Float64Array
+    fold: int = -1
 
 
 class BodyMaker:
-    """Makes bodies of generic models; cuts every mesh into convex pieces only once."""
+    """
+    Makes bodies of generic models and their relatives; cuts every mesh into pieces only once.
 
-    def __init__(self, models: Sequence[GenericModel]) -> None:
-        """Take the models; class id c is models[c - 1]."""
-        self.models = tuple(models)
+    :param models: class id c is models[c - 1].
+    :param population: relatives of each, () = none.
+    """
+
+    def __init__(self, models: Sequence[GenericModel], population: Population = ()) -> None:
+        self.models, self.population = tuple(models), population
         self._pieces: dict[int, list[Float64Array]] = {}
 
     def pieces(self, index: int) -> list[Float64Array]:
@@ -52,23 +62,40 @@ class BodyMaker:
         return self._pieces[index]
 
     def body(self, category: int, rng: np.random.Generator, strength: float = 0.0,
-             symmetry: bool = True) -> Body:
+             symmetry: bool = True, fold: int | None = None) -> Body:
         """
-        Return a Body of the model with class id `category`, reshaped by `strength`.
+        Return a Body of class id `category`, reshaped by `strength`.
+
+        It is made from the generic model or from one of its relatives.
 
         :param symmetry: whether the model's symmetry is kept.
+        :param fold: only relatives of this fold, where there are any.
         """
-        model = self.models[category - 1]
-        pieces = self.pieces(category - 1)
+        relative = self._relative(category, rng, fold)
+        if relative is None:
+            model, pieces, own = self.models[category - 1], self.pieces(category - 1), -1
+        else:
+            model, pieces, own = relative.model, relative.pieces, relative.fold
         if strength <= 0:
-            return Body(category, model.vertices, model.faces, pieces, model.rest_rotations)
+            return Body(category, model.vertices, model.faces, pieces, model.rest_rotations, own)
         vertices, _, warp = reshape(model.vertices, model.faces, rng, strength,
                                     model.symmetry if symmetry else None)
         return Body(category, vertices, model.faces, [warp(p) for p in pieces],
-                    model.rest_rotations)
+                    model.rest_rotations, own)
+
+    def _relative(self, category: int, rng: np.random.Generator,
+                  fold: int | None) -> Relative | None:
+        """Return a random relative of a category, None for the generic model itself."""
+        relatives = self.population[category - 1] if self.population else ()
+        if fold is not None:
+            relatives = tuple(r for r in relatives if r.fold == fold)
+        elif relatives and rng.random() < GENERIC_SHARE:
+            return None
+        return relatives[rng.integers(len(relatives))] if relatives else None
 
 
-@latest(4, key=models_key)
-def body_maker(models: Sequence[GenericModel]) -> BodyMaker:
+@latest(4, key=lambda models, population=(): (models_key(models), tuple(
+    models_key([r.model for r in relatives]) for relatives in population)))
+def body_maker(models: Sequence[GenericModel], population: Population = ()) -> BodyMaker:
     """Return this process's BodyMaker of the models, so that pieces are cut only once."""
-    return BodyMaker(models)
+    return BodyMaker(models, population)

@@ -109,7 +109,8 @@ class Pile:
         translation[2] += lift
         world[:, 2] += lift
         size = body.vertices.max(axis=0) - body.vertices.min(axis=0)
-        return PlacedObject(body.category, translation, quaternion, size, world, body.faces)
+        return PlacedObject(body.category, translation, quaternion, size, world, body.faces,
+                            body.fold)
 
     def _place(self, low: Float64Array, high: Float64Array, radius: float,
                rng: np.random.Generator) -> tuple[Float64Array, float]:

@@ -51,6 +51,7 @@ class PlacedObject:
     :ivar rotation_xyzw: (4,) float64, model axes to world.
     :ivar size: (3,) float64 true extents along the model axes, metres.
     :ivar vertices_world: (V, 3) float64 metres; `faces` (F, 3) int32.
+    :ivar fold: of the Relative that it was made from (population.py), -1 = the generic model.
     """
 
     category: int
@@ -59,6 +60,7 @@ class PlacedObject:
     size: Float64Array
     vertices_world: Float64Array
     faces: Int32Array
+    fold: int = -1
 
 
 def models_key(models: Sequence[GenericModel]) -> tuple[tuple[str, int, int], ...]:

@@ -9,6 +9,7 @@ from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.synthesis.bodies import Body, body_maker
 from hooc_perception.synthesis.pile import Pile, SettleConfig
+from hooc_perception.synthesis.population import Population
 from hooc_perception.synthesis.scatter import PlacedObject, ScatterConfig
 import numpy as np
 from scipy.spatial import ConvexHull
@@ -39,7 +40,8 @@ def settle(bodies: Sequence[Body], rng: np.random.Generator,
 
 def settled_models(models: Sequence[GenericModel], rng: np.random.Generator,
                    scatter: ScatterConfig, strength: float,
-                   config: SettleConfig = SettleConfig()) -> list[PlacedObject]:
+                   config: SettleConfig = SettleConfig(), population: Population = (),
+                   fold: int | None = None) -> list[PlacedObject]:
     """
     Return a settled arrangement of a random subset of models.
 
@@ -47,15 +49,17 @@ def settled_models(models: Sequence[GenericModel], rng: np.random.Generator,
 
     :param scatter: gives the range of counts and the repeats.
     :param strength: how far the objects depart from the generic shapes.
+    :param population: relatives of the models, from which objects are made as well.
+    :param fold: make objects only from relatives of this fold, where there are any.
     :raises HoocError: if there are no models.
     """
     if not models:
         raise HoocError('a settled scene needs at least one model, but there are none; '
                         'add categories to the set')
-    maker = body_maker(models)
+    maker = body_maker(models, population)
     count = int(rng.integers(scatter.objects_low, scatter.objects_high + 1))
     chosen = rng.permutation(np.tile(np.arange(len(models)), scatter.repeats))[:count] + 1
-    bodies = [maker.body(int(c), rng, strength) for c in chosen]
+    bodies = [maker.body(int(c), rng, strength, fold=fold) for c in chosen]
     return settle(bodies, rng, varied(config, rng))
 
 

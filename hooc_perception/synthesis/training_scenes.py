@@ -6,13 +6,14 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from hooc_perception.core.arrays import UInt8Array
+from hooc_perception.core.arrays import Int8Array, UInt8Array
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.memo import latest
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera, GenericModel, RectifiedView
 from hooc_perception.errors import HoocError
+from hooc_perception.synthesis.population import Population
 from hooc_perception.synthesis.reshape import reshape_placed
 from hooc_perception.synthesis.rigs import jittered_rig, random_rig, undistorted
 from hooc_perception.synthesis.room import draw_room, RoomConfig
@@ -65,11 +66,13 @@ class TrainingScene:
     :ivar views: one per camera, with the errors of a calibration.
     :ivar labels: (H, W) uint8 class ids per view, 0 = background; also where depth is NaN.
     :ivar objects: the rendered objects.
+    :ivar folds: (H, W) int8 per view, `fold` of the object at each pixel; -1 = none.
     """
 
     views: tuple[RectifiedView, ...]
     labels: tuple[UInt8Array, ...]
     objects: tuple[PlacedObject, ...]
+    folds: tuple[Int8Array, ...]
 
 
 def render_scene(objects: Sequence[PlacedObject], cameras: Sequence[Camera],
@@ -85,8 +88,10 @@ def render_scene(objects: Sequence[PlacedObject], cameras: Sequence[Camera],
     meshes = solid + room
     classes = np.zeros(len(meshes) + 1, np.uint8)
     classes[:len(objects)] = [o.category for o in objects]
+    fold = np.full(len(classes), -1, np.int8)
+    fold[:len(objects)] = [o.fold for o in objects]
     sensor = randomised(config.sensor, rng) if config.randomise_sensor else config.sensor
-    views, labels = [], []
+    views, labels, folds = [], [], []
     for camera in cameras:
         true = undistorted(camera)
         depth, ids = render_depth(meshes, true)
@@ -99,13 +104,15 @@ def render_scene(objects: Sequence[PlacedObject], cameras: Sequence[Camera],
         written = miscalibrated(true, rng, config.calibration_rad, config.calibration_m)
         views.append(RectifiedView(written, measured))
         labels.append(classes[seen])
-    return TrainingScene(tuple(views), tuple(labels), tuple(objects))
+        folds.append(fold[seen])
+    return TrainingScene(tuple(views), tuple(labels), tuple(objects), tuple(folds))
 
 
 def training_scene(models: Sequence[GenericModel], cameras: Sequence[Camera],
                    rng: np.random.Generator, config: TrainingConfig = TrainingConfig(),
                    scatterer: Scatterer | None = None,
-                   objects: Sequence[PlacedObject] | None = None) -> TrainingScene:
+                   objects: Sequence[PlacedObject] | None = None,
+                   population: Population = (), fold: int | None = None) -> TrainingScene:
     """
     Return one random TrainingScene.
 
@@ -113,12 +120,14 @@ def training_scene(models: Sequence[GenericModel], cameras: Sequence[Camera],
     :param cameras: of the set; lens distortion is ignored.
     :param scatterer: of the same models, kept between calls for speed.
     :param objects: an existing arrangement to render instead of a new one.
+    :param population: relatives of the models; settled objects are made from them as well.
+    :param fold: make objects only from relatives of this fold, where there are any.
     """
     if not cameras:
         raise HoocError('training scenes need at least one camera, but there are none; add '
                         'cameras to the set')
     if objects is None and config.arrangement == 'settled':
-        objects = _settled(models, rng, config)
+        objects = _settled(models, rng, config, population, fold)
     elif objects is None:
         objects = (scatterer or Scatterer(models, config.scatter)).scene(rng)
         if config.reshape_strength > 0:
@@ -175,8 +184,10 @@ def _group(models: Sequence[GenericModel], cameras: Sequence[Camera], config: Tr
 
 
 def _settled(models: Sequence[GenericModel], rng: np.random.Generator,
-             config: TrainingConfig) -> list[PlacedObject]:
-    """Return a settled arrangement of reshaped models."""
+             config: TrainingConfig, population: Population = (),
+             fold: int | None = None) -> list[PlacedObject]:
+    """Return a settled arrangement of reshaped models and relatives."""
     # Imported late: the paper's scenes do not need physics.
     from hooc_perception.synthesis.settle import settled_models
-    return settled_models(models, rng, config.scatter, config.reshape_strength)
+    return settled_models(models, rng, config.scatter, config.reshape_strength,
+                          population=population, fold=fold)

@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 
 from hooc_perception.core.config import Config
 from hooc_perception.core.types import Camera, GenericModel
+from hooc_perception.synthesis.population import Population
 from tqdm import tqdm
 
 # Arrays and numpy scalars by name, as a MODEL folder stores them.
@@ -19,12 +20,14 @@ class TrainingContext:
     What a training step may read.
 
     :ivar models: tuple of GenericModel; class id c is models[c - 1].
+    :ivar population: relatives of the models, () = none.
     :ivar cameras: tuple of Camera of the set; `max_instances` as in SceneSet.
     :ivar configs: the Config objects of the profile; `jobs` worker processes or threads.
     :ivar classifier: arrays of the earlier steps.
     """
 
     models: tuple[GenericModel, ...]
+    population: Population
     cameras: tuple[Camera, ...]
     max_instances: int
     profile: str

@@ -8,13 +8,14 @@ information gain over a random subset of features per node. scikit-learn's rando
 reference in the tests; it is ten times slower with this many classes and features.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import cast, TypeAlias
 
-from hooc_perception.core.arrays import AnyArray, Float32Array, UInt8Array
+from hooc_perception.core.arrays import AnyArray, Float32Array, Int8Array, UInt8Array
 from hooc_perception.core.classification.forest import Forest, quantised
 from hooc_perception.core.config import Config, param
+from hooc_perception.synthesis.population import FOLDS
 from hooc_perception.training.kernels import table_tree
 from hooc_perception.training.kernels.splits import Limits
 from hooc_perception.training.kernels.table_tree import Table
@@ -68,7 +69,8 @@ def quantise(x: Float32Array, cuts: Float32Array) -> UInt8Array:
 
 def fit(binned: UInt8Array, y: UInt8Array, n_classes: int, cuts: Float32Array,
         config: FitConfig, rng: np.random.Generator, n_jobs: int = 1,
-        progress: Callable[[int], object] | None = None) -> Forest:
+        progress: Callable[[int], object] | None = None,
+        fold: Int8Array | None = None) -> Forest:
     """
     Return a Forest fitted to quantised features.
 
@@ -76,31 +78,40 @@ def fit(binned: UInt8Array, y: UInt8Array, n_classes: int, cuts: Float32Array,
     :param cuts: (F, B) float32 split values; bin b means value <= cuts[b].
     :param rng: the same generator state gives the same forest for any `n_jobs`.
     :param progress: called with 1 after every tree.
+    :param fold: (n,) int8; tree t never sees the samples of fold t % FOLDS. None = all see all.
     """
     n = len(y)
     prior = np.bincount(y, minlength=n_classes) / n
-    m = max(1, int(round(config.sample_share * n)))
     seeds = rng.integers(1 << 31, size=(config.trees, 2))
     table = Table(binned, y, n_classes, config.bins)
     limits = Limits(config.node_samples, config.max_depth, config.min_leaf,
                     config.min_gain_bits)
 
-    def one(order_seed: int, node_seed: int) -> Tree:
-        order = np.random.default_rng(order_seed).permutation(n)[:m].astype(np.int32)
+    def one(tree: int, order_seed: int, node_seed: int) -> Tree:
+        seen = np.ones(n, bool) if fold is None else fold != tree % FOLDS
+        order = np.random.default_rng(order_seed).permutation(n)
+        order = order[seen[order]]
+        order = order[:max(1, round(config.sample_share * len(order)))].astype(np.int32)
         feature, split, left = table_tree.grow_tree(
             table, np.sort(order), config.features_per_node, limits, int(node_seed))
         end = table_tree.walk_binned(binned, feature, split, left)
         threshold = np.zeros(len(feature), np.float32)
         inner = feature >= 0
         threshold[inner] = cuts[feature[inner], split[inner]]
-        counts = np.bincount(end * n_classes + y, minlength=len(feature) * n_classes)
+        counts = np.bincount((end * n_classes + y)[seen], minlength=len(feature) * n_classes)
         counts = counts.reshape(-1, n_classes)[~inner] + config.prior * prior
         if progress:
             progress(1)
         return feature, threshold, left, quantised(counts)
 
-    trees = Parallel(n_jobs=n_jobs, require='sharedmem')(delayed(one)(*s) for s in seeds)
+    trees = Parallel(n_jobs=n_jobs, require='sharedmem')(delayed(one)(t, *s)
+                                                         for t, s in enumerate(seeds))
     return joined(cast(list[Tree], trees))
+
+
+def unaware_of(arrays: Mapping[str, AnyArray], fold: int, prefix: str) -> dict[str, AnyArray]:
+    """Return a forest's arrays with only the trees that have not seen the samples of a fold."""
+    return {**arrays, prefix + 'roots': arrays[prefix + 'roots'][fold::FOLDS]}
 
 
 def joined(trees: Sequence[Tree]) -> Forest:

@@ -3,8 +3,9 @@
 """
 Learn to verify candidates (core/parsing/verifier.py) from parsed synthetic scenes.
 
-The scenes are of the same kind as those that the classifier was trained on, but not the same
-ones: on its own training data a classifier looks better than it is.
+All objects of a scene are made from shapes of one fold, and only those trees of the classifier
+that have never seen this fold take part: on shapes that it knows a classifier looks better than
+it is.
 """
 
 from collections.abc import Callable
@@ -19,9 +20,16 @@ from hooc_perception.core.profiles import profile
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.parser import Parser
+from hooc_perception.synthesis.population import FOLDS, Population
 from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
 from hooc_perception.training.context import Arrays, TrainingContext
-from hooc_perception.training.fit_forest import fit, FitConfig, quantise, thresholds
+from hooc_perception.training.fit_forest import (
+    fit,
+    FitConfig,
+    quantise,
+    thresholds,
+    unaware_of,
+)
 from hooc_perception.training.fused_scenes import FusedScenesConfig, scene_config
 from joblib import delayed, Parallel
 import numpy as np
@@ -49,10 +57,12 @@ class _Scenes:
     """
     Synthetic scenes, parsed by the chain that the verifier is for.
 
+    :ivar parsers: for each fold, with the trees that have not seen it.
     :ivar base: what the scenes look like, before rig and deformation are drawn.
     """
 
-    parser: Parser
+    parsers: tuple[Parser, ...]
+    population: Population
     cameras: tuple[Camera, ...]
     config: VerifierConfig
     base: TrainingConfig
@@ -64,24 +74,25 @@ class _Scenes:
 
         :raises HoocError: where the parser's method has no verifier.
         """
-        config, models, seed = self.config, self.parser.models, self.seed
+        config, seed, fold = self.config, self.seed, k % len(self.parsers)
+        parser = self.parsers[fold]
         rng = stage_rng(seed, 'verifier scenes', k)
         rig = 'random' if rng.random() < config.random_rigs else 'jittered'
         strength = float(rng.uniform(config.reshape_low, config.reshape_high))
-        scene = training_scene(models, self.cameras, rng,
-                               replace(self.base, rig=rig, reshape_strength=strength))
-        method = self.parser.method
+        scene = training_scene(parser.models, self.cameras, rng,
+                               replace(self.base, rig=rig, reshape_strength=strength),
+                               population=self.population, fold=fold)
+        method = parser.method
         if not isinstance(method, JointMethod):
-            raise HoocError(f'the profile {self.parser.profile.name} has no verifier; train '
+            raise HoocError(f'the profile {parser.profile.name} has no verifier; train '
                             'without one')
-        observation = self.parser.observe(scene.views)
-        frame = self.parser.frame(observation, self.parser.classify(observation))
-        search = method.search(frame, method.propose(frame, seed), seed,
-                               self.parser.max_instances)
+        observation = parser.observe(scene.views)
+        frame = parser.frame(observation, parser.classify(observation))
+        search = method.search(frame, method.propose(frame, seed), seed, parser.max_instances)
         x = features(search)
         right = np.zeros(len(x), np.uint8)
         for o in scene.objects:
-            reach = config.right_within * models[o.category - 1].longest_side
+            reach = config.right_within * o.size.max()
             right |= ((search.pool.category == o.category)
                       & (np.linalg.norm(search.pool.translation - o.translation, axis=1) < reach))
         return x, right
@@ -99,8 +110,9 @@ def verifier_table(context: TrainingContext, config: VerifierConfig,
                  FusedScenesConfig())
     limit = context.max_instances
     scenes = _Scenes(
-        Parser(context.models, context.classifier, profile(context.profile), limit),
-        context.cameras, config, scene_config(fused, min(limit, 4) or 3), context.seed)
+        tuple(Parser(context.models, unaware_of(context.classifier, fold, 'forest_'),
+                     profile(context.profile), limit) for fold in range(FOLDS)),
+        context.population, context.cameras, config, scene_config(fused, min(limit, 4) or 3), context.seed)
     parts = []
     with Parallel(n_jobs=context.jobs, return_as='generator') as parallel:
         for part in parallel(delayed(_Scenes.parsed)(scenes, k)

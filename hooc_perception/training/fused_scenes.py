@@ -4,11 +4,12 @@
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import cast, TypeAlias
 
 from hooc_perception.core.arrays import (
     Float32Array,
     Float64Array,
+    Int8Array,
     Int32Array,
     Int64Array,
     UInt8Array,
@@ -16,17 +17,26 @@ from hooc_perception.core.arrays import (
 from hooc_perception.core.classification import features
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.profiles import profile
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import Camera, GenericModel, Observation
+from hooc_perception.synthesis.population import Population
 from hooc_perception.synthesis.scatter import ScatterConfig
-from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
+from hooc_perception.synthesis.training_scenes import (
+    training_scene,
+    TrainingConfig,
+    TrainingScene,
+)
+from hooc_perception.training.context import TrainingContext
 from hooc_perception.training.fit_forest import quantise, thresholds
 from joblib import delayed, Parallel
 import numpy as np
 
 # Scenes per parallel task.
 GROUP = 4
+# Of n pixels: x (n, F) float32, y (n,) uint8 classes, fold (n,) int8 of the objects' shapes.
+Rows: TypeAlias = tuple[Float32Array, UInt8Array, Int8Array]
 
 
 @dataclass(frozen=True)
@@ -37,10 +47,13 @@ class FusedScenesConfig(Config):
     random_rigs: float = param(0.3, 'Share of scenes seen by a random rig of one to four cameras '
                                'instead of the given one, moved a little; they keep the forest '
                                'usable on any rig.', '', 0.0, 1.0)
-    reshape_low: float = param(0.5, 'Smallest deviation of the objects of a scene from the '
+    reshape_low: float = param(0.4, 'Smallest deviation of the objects of a scene from the '
                                'generic meshes; 1 = as real objects.', '', 0.0, 3.0)
-    reshape_high: float = param(1.8, 'Largest deviation; scenes draw uniformly in between.', '',
+    reshape_high: float = param(1.5, 'Largest deviation; scenes draw uniformly in between.', '',
                                 0.0, 3.0)
+    relatives: bool = param(True, 'Whether objects are also made from the families of the '
+                            'built-in catalogue that bear the names of the categories, or, where '
+                            'there is none, from strongly reshaped copies.')
     translucent: float = param(0.08, 'Share of objects with the depth error of glass.', '', 0.0,
                                1.0)
     objects_low: int = param(8, 'Fewest objects per scene.', '', 1, 200)
@@ -61,13 +74,14 @@ class FusedTable:
     """
     Quantised features of labelled pixels.
 
-    :ivar binned: (F, n) uint8; `cuts` (F, bins - 1) float32; `y` (n,) uint8 classes;
-        `scene` (n,) int32; `probes` (P, 5) as in `core.classification.features.draw_probes`.
+    :ivar binned: (F, n) uint8; `cuts` (F, bins - 1) float32; `y` (n,) uint8 classes; `fold` (n,)
+        int8 of the shapes (synthesis/population.py); `scene` (n,) int32; `probes` (P, 5) as in `core.classification.features.draw_probes`.
     """
 
     binned: UInt8Array
     cuts: Float32Array
     y: UInt8Array
+    fold: Int8Array
     scene: Int32Array
     probes: Float64Array
 
@@ -91,18 +105,18 @@ def draw_rows(y: UInt8Array, rng: np.random.Generator, rows_sqrt: float) -> Int6
     return np.sort(np.concatenate(rows)) if rows else np.zeros(0, np.int64)
 
 
-def labelled_features(observation: Observation, labels: Sequence[UInt8Array],
-                      probes: Float64Array, rng: np.random.Generator,
-                      rows_sqrt: float) -> tuple[Float32Array, UInt8Array]:
-    """Return (x (n, F) float32, y (n,) uint8) of drawn foreground pixels of one scene."""
+def labelled_features(observation: Observation, scene: TrainingScene, probes: Float64Array,
+                      rng: np.random.Generator, rows_sqrt: float) -> Rows:
+    """Return the Rows of drawn foreground pixels of one scene and its Observation."""
     pixels = features.foreground_pixels(observation)
-    y = np.concatenate([label[view.foreground & np.isfinite(view.depth)]
-                        for view, label in zip(observation.views, labels)])
+    front = [view.foreground & np.isfinite(view.depth) for view in observation.views]
+    y = np.concatenate([label[mask] for label, mask in zip(scene.labels, front)])
+    fold = np.concatenate([each[mask] for each, mask in zip(scene.folds, front)])
     if not len(y):
-        return np.zeros((0, features.feature_count(len(probes))), np.float32), y
+        return np.zeros((0, features.feature_count(len(probes))), np.float32), y, fold
     rows = draw_rows(y, rng, rows_sqrt)
     around = features.surroundings(observation, pixels)
-    return features.pixel_features(pixels, around, probes, rows), y[rows]
+    return features.pixel_features(pixels, around, probes, rows), y[rows], fold[rows]
 
 
 @dataclass(frozen=True)
@@ -110,55 +124,55 @@ class _Source:
     """
     Where synthetic scenes come from.
 
+    :ivar population: relatives of the models.
     :ivar repeats: most objects of one category per scene.
     """
 
     models: Sequence[GenericModel]
+    population: Population
     cameras: Sequence[Camera]
     config: FusedScenesConfig
     repeats: int
     seed: int
     observe: ObserveConfig
 
-    def features(self, k: int, probes: Float64Array) -> tuple[Float32Array, UInt8Array]:
-        """Return (x (n, F), y (n,)) of drawn foreground pixels of scene k."""
+    def features(self, k: int, probes: Float64Array) -> Rows:
+        """Return the Rows of drawn foreground pixels of scene k."""
         rng, config = stage_rng(self.seed, 'fused scenes', k), self.config
         rig = 'random' if rng.random() < config.random_rigs else 'jittered'
         strength = float(rng.uniform(config.reshape_low, config.reshape_high))
         scene = training_scene(self.models, self.cameras, rng,
                                replace(scene_config(config, self.repeats), rig=rig,
-                                       reshape_strength=strength))
-        return labelled_features(observe(scene.views, self.observe), scene.labels, probes, rng,
+                                       reshape_strength=strength),
+                               population=self.population)
+        return labelled_features(observe(scene.views, self.observe), scene, probes, rng,
                                  config.rows_sqrt)
 
 
-def _raw_group(source: _Source, start: int, stop: int,
-               probes: Float64Array) -> list[tuple[Float32Array, UInt8Array]]:
-    """Return (x, y) of the scenes start .. stop - 1."""
+def _raw_group(source: _Source, start: int, stop: int, probes: Float64Array) -> list[Rows]:
+    """Return the Rows of the scenes start .. stop - 1."""
     return [source.features(k, probes) for k in range(start, stop)]
 
 
 def _binned_group(source: _Source, start: int, stop: int, probes: Float64Array,
-                  cuts: Float32Array) -> list[tuple[UInt8Array, UInt8Array]]:
-    """Return (quantised x, y) of the scenes start .. stop - 1."""
-    return [(quantise(x, cuts), y) for x, y in _raw_group(source, start, stop, probes)]
+                  cuts: Float32Array) -> list[tuple[UInt8Array, UInt8Array, Int8Array]]:
+    """Return (quantised x, y, fold) of the scenes start .. stop - 1."""
+    return [(quantise(x, cuts), *rest) for x, *rest in _raw_group(source, start, stop, probes)]
 
 
-def fused_table(models: Sequence[GenericModel], cameras: Sequence[Camera],
-                config: FusedScenesConfig, seed: int, max_instances: int = 0, n_jobs: int = 1,
-                progress: Callable[[int], object] | None = None,
-                observe_config: ObserveConfig = ObserveConfig()) -> FusedTable:
+def fused_table(context: TrainingContext, config: FusedScenesConfig,
+                progress: Callable[[int], object] | None = None) -> FusedTable:
     """
-    Return the FusedTable of synthetic scenes; the same for any `n_jobs`.
+    Return the FusedTable of synthetic scenes; the same for any number of jobs.
 
-    :param max_instances: most objects of one category per scene, 0 = no limit.
     :param progress: called with the number of scenes done since the last call.
-    :param observe_config: parameters of stage 1, as inference will use them.
     """
-    source = _Source(models, cameras, config, min(max_instances, 4) or 3, seed, observe_config)
+    seed, limit = context.seed, context.max_instances
+    source = _Source(context.models, context.population, context.cameras, config,
+                     min(limit, 4) or 3, seed, profile(context.profile).observe)
     probes = features.draw_probes(stage_rng(seed, 'probes'), config.probes)
     first = min(config.quantile_scenes, config.scenes)
-    with Parallel(n_jobs=n_jobs, return_as='generator') as parallel:
+    with Parallel(n_jobs=context.jobs, return_as='generator') as parallel:
         def scenes(work: Callable[..., list], low: int, high: int, *arrays: object) -> list:
             done = []
             groups = parallel(delayed(work)(source, start, min(start + GROUP, high), *arrays)
@@ -170,10 +184,11 @@ def fused_table(models: Sequence[GenericModel], cameras: Sequence[Camera],
             return done
 
         raw = scenes(_raw_group, 0, first, probes)
-        cuts = thresholds(np.concatenate([x for x, _ in raw]), config.bins,
+        cuts = thresholds(np.concatenate([x for x, *_ in raw]), config.bins,
                           stage_rng(seed, 'thresholds'))
-        parts = [(quantise(x, cuts), y) for x, y in raw]
+        parts = [(quantise(x, cuts), *rest) for x, *rest in raw]
         parts.extend(scenes(_binned_group, first, config.scenes, probes, cuts))
-    y = np.concatenate([y for _, y in parts])
-    scene = np.repeat(np.arange(len(parts), dtype=np.int32), [len(y) for _, y in parts])
-    return FusedTable(np.concatenate([x for x, _ in parts], axis=1), cuts, y, scene, probes)
+    y, fold = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    scene = np.repeat(np.arange(len(parts), dtype=np.int32), [len(y) for _, y, _ in parts])
+    return FusedTable(np.concatenate([x for x, *_ in parts], axis=1), cuts, y, fold, scene,
+                      probes)

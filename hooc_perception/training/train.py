@@ -18,16 +18,16 @@ from hooc_perception.core.classification.classify import FORMAT_VERSION, KIND_FU
 from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.config import Config
 from hooc_perception.core.geometry import stage_rng
-from hooc_perception.core.profiles import profile as profile_of
 from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.objects.derive import derive
 from hooc_perception.objects.mesh import load_mesh
+from hooc_perception.synthesis.population import relatives_of
 from hooc_perception.synthesis.training_scenes import PAPER, training_scenes
 from hooc_perception.trained.folder import check_place, ModelFolder, save_model_folder
 from hooc_perception.training import fit_pixels
 from hooc_perception.training.context import Arrays, TrainingContext
-from hooc_perception.training.fit_forest import fit, FitConfig
+from hooc_perception.training.fit_forest import fit, FitConfig, unaware_of
 from hooc_perception.training.fit_verifier import fit_verifier, VerifierConfig
 from hooc_perception.training.fused_scenes import fused_table, FusedScenesConfig, FusedTable
 import joblib
@@ -37,7 +37,7 @@ from tqdm import tqdm
 T = TypeVar('T')
 PROFILES: dict[str, tuple[Config, ...]] = {
     'paper': (fit_pixels.PixelFitConfig(),),
-    'best': (FusedScenesConfig(), FitConfig(), VerifierConfig()),
+    'best': (FusedScenesConfig(), FitConfig(trees=42), VerifierConfig()),
     'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24),
              VerifierConfig(verifier_scenes=30)),
 }
@@ -134,8 +134,11 @@ def train_classifier(models: Sequence[GenericModel], cameras: Sequence[Camera],
                      progress: bool = False) -> Arrays:
     """Return the classifier's dict of arrays, from a step for each of the configs."""
     configs = tuple(configs or PROFILES[profile])
-    context = TrainingContext(tuple(models), tuple(cameras), max_instances, profile, seed,
-                              configs, jobs or joblib.cpu_count(), progress, {})
+    jobs = jobs or joblib.cpu_count()
+    fused = any(isinstance(c, FusedScenesConfig) and c.relatives for c in configs)
+    context = TrainingContext(tuple(models), relatives_of(models, seed, jobs) if fused else (),
+                              tuple(cameras), max_instances, profile, seed, configs, jobs,
+                              progress, {})
     for config in configs:
         if type(config) in STEPS:
             context.classifier.update(STEPS[type(config)](context, config))
@@ -177,28 +180,36 @@ def _fused(context: TrainingContext, scenes: FusedScenesConfig) -> Arrays:
     """Learn one forest over fused features, and its accuracy on scenes that are held out."""
     forest_config = next(c for c in context.configs if isinstance(c, FitConfig))
     with context.bar(scenes.scenes, 'synthetic scenes', 'scene') as bar:
-        table = fused_table(context.models, context.cameras, scenes, context.seed,
-                            context.max_instances, context.jobs, bar.update,
-                            profile_of(context.profile).observe)
+        table = fused_table(context, scenes, bar.update)
     kept = table.scene < scenes.scenes - max(1, scenes.scenes // 25)
     with context.bar(forest_config.trees, 'trees', 'tree') as bar:
         forest = fit(np.ascontiguousarray(table.binned[:, kept]), table.y[kept],
                      len(context.models) + 1, table.cuts, forest_config,
-                     stage_rng(context.seed, 'fused forest'), context.jobs, bar.update)
+                     stage_rng(context.seed, 'fused forest'), context.jobs, bar.update,
+                     table.fold[kept])
     held_out = {'held_out_accuracy': _accuracy(forest, table, ~kept)}
     return {**_head(context, KIND_FUSED, held_out), 'probes': table.probes,
             **forest.arrays('forest_')}
 
 
 def _accuracy(forest: Forest, table: FusedTable, rows: BoolArray) -> float | None:
-    """Return the share of held-out object pixels whose class is the most likely one."""
+    """
+    Return the share of held-out object pixels whose class is the most likely one.
+
+    Each fold of shapes is judged by the trees that have not seen it.
+    """
     rows &= table.y > 0
     if not rows.any():
         return None
     # Any value strictly inside of a bin takes the same branches as the original did.
     edges = np.concatenate([table.cuts, np.full((len(table.cuts), 1), np.inf, np.float32)], 1)
-    x = np.take_along_axis(edges, table.binned[:, rows].astype(np.int64), axis=1).T
-    return round(float((forest.predict(x).argmax(1) == table.y[rows]).mean()), 4)
+    right = 0
+    for fold in np.unique(table.fold[rows]):
+        mine = rows & (table.fold == fold)
+        judges = forest if fold < 0 else Forest.from_arrays(unaware_of(forest.arrays(), fold, ''))
+        x = np.take_along_axis(edges, table.binned[:, mine].astype(np.int64), axis=1).T
+        right += int((judges.predict(x).argmax(1) == table.y[mine]).sum())
+    return round(right / int(rows.sum()), 4)
 
 
 def _counted(items: Iterable[T], bar: tqdm) -> Iterator[T]:

@@ -97,8 +97,10 @@ class Search:
         """Add Candidates to the pool; none of them is chosen yet."""
         if not len(new):
             return
-        stats, lists = self.evidence.compare_pixels(
-            hypotheses_of(new, self.models), new.category, self.config.pixels.weights())
+        H = hypotheses_of(new, self.models)
+        stats, lists = self.evidence.compare_pixels(H, new.category,
+                                                    self.config.pixels.weights())
+        lists = self.evidence.with_residue(lists, H, new.size, self.config.residue)
         first = not len(self.pool)
         self.stats = stats if first else np.concatenate([self.stats, stats])
         self.lists = lists if first else self.lists.extended(lists)

@@ -1,0 +1,93 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+The shapes from which the objects of training scenes are made.
+
+A category is more than one mesh: where the built-in catalogue has a family of its name, its
+members (relatives) take part in training beside the mesh of the set; where it has none, strongly
+reshaped copies of that mesh do. They teach what varies between objects of one kind; the answer
+still speaks of the meshes of the set alone. Relatives belong to folds. Every tree of the
+classifier sees all folds but one, so that a scene with the members of that one shows how well
+the tree does on shapes that it has never seen.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hooc_perception.core.arrays import Float64Array
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.types import GenericModel
+from hooc_perception.objects.catalogue import family_name, TRAINING, variant
+from hooc_perception.objects.derive import derive
+from hooc_perception.objects.repair import closed
+from hooc_perception.synthesis.convex import convex_pieces
+from hooc_perception.synthesis.reshape import reshape
+from joblib import delayed, Parallel
+import numpy as np
+import trimesh
+
+# Sets of shapes; each tree of a classifier is kept from one of them.
+FOLDS = 3
+# Members drawn from each style of a family; training bends every object anew in addition.
+DRAWS = 2
+# Copies of a mesh without a family, and how strongly they are reshaped.
+COPIES, COPY_STRENGTH = 6, 1.5
+# A set's own mesh tells how large its objects are: a family that differs by more is scaled.
+SIZE_LIMIT = 2.0
+# Few samples are enough: nobody draws from them.
+SURFACE_POINTS, INTERIOR_POINTS = 64, 16
+
+
+@dataclass(frozen=True)
+class Relative:
+    """
+    Another shape of a category.
+
+    :ivar model: GenericModel in axes of its own.
+    :ivar pieces: (n, 3) convex vertex sets that cover it, for physics.
+    :ivar fold: 0 .. FOLDS - 1.
+    """
+
+    model: GenericModel
+    pieces: list[Float64Array]
+    fold: int
+
+
+# Relatives of each category; class id c has population[c - 1].
+Population = tuple[tuple[Relative, ...], ...]
+
+
+def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1) -> Population:
+    """Return the Population of the models; the same seed gives the same one for any `jobs`."""
+    wanted = []
+    for index, model in enumerate(models):
+        family = family_name(model.name)
+        if family:
+            wanted += [(index, style, n % FOLDS, draw)
+                       for n, style in enumerate(TRAINING[family]) for draw in range(DRAWS)]
+        else:
+            wanted += [(index, -1, copy % FOLDS, copy) for copy in range(COPIES)]
+    made = Parallel(n_jobs=jobs)(
+        delayed(_relative)(models[index], style, fold,
+                           stage_rng(seed, 'relatives', index, style + 1, draw))
+        for index, style, fold, draw in wanted)
+    population: list[list[Relative]] = [[] for _ in models]
+    for (index, *_), relative in zip(wanted, made):
+        population[index].append(relative)
+    return tuple(tuple(each) for each in population)
+
+
+def _relative(model: GenericModel, style: int, fold: int, rng: np.random.Generator) -> Relative:
+    """Return a Relative of a model: a style of its family, or a reshaped copy (-1)."""
+    if style < 0:
+        moved = reshape(model.vertices, model.faces, rng, COPY_STRENGTH, model.symmetry)[0]
+        mesh = trimesh.Trimesh(moved, model.faces, process=False)
+    else:
+        family = family_name(model.name)
+        mesh = variant(family, style, rng)
+        ratio = model.longest_side / float(variant(family).extents.max())
+        if not 1 / SIZE_LIMIT < ratio < SIZE_LIMIT:
+            mesh.apply_scale(ratio)
+    shape = derive(model.name, mesh, rng, SURFACE_POINTS, INTERIOR_POINTS)
+    solid = closed(trimesh.Trimesh(shape.vertices, shape.faces, process=False))
+    return Relative(shape, convex_pieces(solid), fold)

@@ -89,8 +89,7 @@ class Scene:
         """Return (vertices (V, 3) world, metres; faces (F, 3)) of each object, in place."""
         objects = self.parsed.objects
         out = []
-        for k in range(len(objects)):
-            model = self.models[int(objects.category[k]) - 1]
+        for k, model in enumerate(objects.shapes(self.models)):
             out.append((posed_vertices(model, objects.translation[k], objects.rotation_xyzw[k],
                                        objects.size[k]), model.faces))
         return out

@@ -131,8 +131,9 @@ def half_turns(objects: Candidates, models: Sequence[GenericModel],
     :return: the turned objects, and the row (n,) int64 of `objects` that each comes from.
     """
     rows, turned = [], []
+    shapes = objects.shapes(models)
     for i, rotation in enumerate(Rotation.from_quat(objects.rotation_xyzw)):
-        symmetry = np.asarray(models[int(objects.category[i]) - 1].symmetry)
+        symmetry = np.asarray(shapes[i].symmetry)
         if is_ball(symmetry):
             continue
         for axis in np.flatnonzero(symmetry % 2 == 1):
@@ -183,8 +184,7 @@ def canonical_objects(objects: Candidates, models: Sequence[GenericModel],
     :param references: one (3, 3) or None an object; None = the world's axes for all.
     """
     rotation, size = objects.rotation_xyzw.copy(), objects.size.copy()
-    for i in range(len(objects)):
-        model = models[int(objects.category[i]) - 1]
+    for i, model in enumerate(objects.shapes(models)):
         R = Rotation.from_quat(rotation[i]).as_matrix()
         extents = np.maximum(model.extents, 1e-9)
         turned, scale = nearest_equivalent(R, size[i] / extents, model.symmetry,

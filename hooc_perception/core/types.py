@@ -9,6 +9,7 @@ world frame has z up and the table top at z = 0; camera frames are optical (x ri
 z forward). Pixel centres have integer coordinates.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from hooc_perception.core.arrays import (
@@ -118,6 +119,8 @@ class Candidates:
     :ivar rotation_xyzw: (n, 4) float64 unit quaternion, model axes to world.
     :ivar size: (n, 3) float32 extents along the model axes, metres.
     :ivar score: (n,) float32, the larger the better; comparable within a category.
+    :ivar member: (n,) uint16, which mesh of the category's family, see GenericModel.members;
+        default 0 everywhere, the generic mesh itself.
     """
 
     category: UInt16Array
@@ -125,6 +128,12 @@ class Candidates:
     rotation_xyzw: Float64Array
     size: Float32Array
     score: Float32Array
+    member: UInt16Array = field(default_factory=lambda: np.zeros(0, np.uint16))
+
+    def __post_init__(self) -> None:
+        """Let every row be the generic mesh where nothing else was said."""
+        if not len(self.member) and len(self.category):
+            object.__setattr__(self, 'member', np.zeros(len(self.category), np.uint16))
 
     def __len__(self) -> int:
         """Return the number of candidates."""
@@ -139,13 +148,19 @@ class Candidates:
     def take(self, index: 'AnyArray | list[int]') -> 'Candidates':
         """Return the rows that `index` (integers or bool mask) names."""
         return Candidates(self.category[index], self.translation[index],
-                          self.rotation_xyzw[index], self.size[index], self.score[index])
+                          self.rotation_xyzw[index], self.size[index], self.score[index],
+                          self.member[index])
 
     def extended(self, other: 'Candidates') -> 'Candidates':
         """Return these rows followed by the rows of `other`."""
         return Candidates(*(np.concatenate([getattr(self, name), getattr(other, name)])
                             for name in ('category', 'translation', 'rotation_xyzw', 'size',
-                                         'score')))
+                                         'score', 'member')))
+
+    def shapes(self, models: Sequence['GenericModel']) -> 'list[GenericModel]':
+        """Return the mesh of each row; class id c is models[c - 1]."""
+        return [models[c - 1].members[m] for c, m in zip(self.category.tolist(),
+                                                         self.member.tolist())]
 
 
 @dataclass(frozen=True)
@@ -165,6 +180,7 @@ class GenericModel:
     :ivar rest_probability: (R,) float64, sums to at most 1.
     :ivar symmetry: axis order around each model axis, (3,) int32: 1 none, 2, 3, 4, ... and
         0 for a continuous (revolution) symmetry.
+    :ivar variants: further meshes of the category, in the same axes.
     """
 
     name: str
@@ -178,6 +194,12 @@ class GenericModel:
     rest_rotations: Float64Array
     rest_probability: Float64Array
     symmetry: Int32Array
+    variants: 'tuple[GenericModel, ...]' = ()
+
+    @property
+    def members(self) -> 'tuple[GenericModel, ...]':
+        """Return all meshes of the category's family, this one first."""
+        return (self, *self.variants)
 
     @property
     def longest_side(self) -> float:

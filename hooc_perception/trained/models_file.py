@@ -3,6 +3,7 @@
 """The file models.npz of a MODEL folder: everything derived from the generic models."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from hooc_perception.core.arrays import AnyArray
@@ -18,8 +19,11 @@ JOINED = ('vertices', 'faces', 'rest_rotations', 'rest_probability')
 
 
 def write_models(file: Path, models: Sequence[GenericModel]) -> None:
-    """Write models.npz."""
-    arrays: dict[str, AnyArray] = {
+    """Write models.npz; the members of each family follow one another."""
+    members = [len(model.members) for model in models]
+    models = [member for model in models for member in model.members]
+    arrays: dict[str, AnyArray] = {'members': np.array(members, np.int64)}
+    arrays |= {
         key: np.stack([np.asarray(_fields(m)[key]) for m in models]) for key in STACKED}
     for key in JOINED:
         arrays[key] = np.concatenate([_fields(m)[key] for m in models])
@@ -32,10 +36,15 @@ def read_models(file: Path, names: Sequence[str]) -> tuple[GenericModel, ...]:
     """Return the models in models.npz after checking shapes and indices; `names` in order."""
     try:
         data = load_plain_archive(file)
+        # Folders from before there were families have one mesh per category.
+        members = data.get('members', np.ones(len(names), np.int64))
+        if members.shape != (len(names),) or members.min(initial=1) < 1:
+            raise ValueError('the families do not add up')
+        names = [name for name, count in zip(names, members) for _ in range(count)]
         n = len(names)
         for key in STACKED:
             if len(data[key]) != n:
-                raise ValueError(f'{key} has {len(data[key])} rows for {n} categories')
+                raise ValueError(f'{key} has {len(data[key])} rows for {n} meshes')
         parts = {}
         for key in JOINED:
             count = data[f'{key}_count']
@@ -48,6 +57,9 @@ def read_models(file: Path, names: Sequence[str]) -> tuple[GenericModel, ...]:
             for i, name in enumerate(names))
         for model in models:
             _check_model(model)
+        first = np.cumsum(members) - members
+        models = tuple(replace(models[k], variants=models[k + 1:k + count])
+                       for k, count in zip(first, members))
     except Exception as e:      # zipfile and numpy fail on damaged bytes in many ways
         raise HoocError(f'{file} is not what hooc train writes ({short_reason(e)}); '
                         'train again') from e

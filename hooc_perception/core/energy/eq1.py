@@ -50,8 +50,7 @@ def pixel_lists(observation: Observation, objects: Candidates, models: Sequence[
     """
     first = first_pixels(observation.views)
     counts, pixels, depths = [0], [np.zeros(0, np.int64)], [np.zeros(0, np.float32)]
-    for k in range(len(objects)):
-        model = models[objects.category[k] - 1]
+    for k, model in enumerate(objects.shapes(models)):
         vertices = posed_vertices(model, objects.translation[k], objects.rotation_xyzw[k],
                                   objects.size[k])
         count = 0

@@ -40,7 +40,7 @@ class JointEnergy(ImagesAndVolumes):
         self.n = len(pool)
         prior = np.zeros(self.n)
         if self.n:
-            extents = np.array([models[c - 1].extents for c in pool.category])
+            extents = np.array([shape.extents for shape in pool.shapes(models)])
             prior = (np.log(pool.size / np.maximum(extents, 1e-9)) ** 2).sum(1)
         scale = evidence.scale
         base = costs.base_cost if penalty is None else penalty

@@ -93,18 +93,19 @@ class OverlapTerm:
         self.n = n = len(objects)
         self._count = count
         self._active = np.zeros(n, bool)
-        classes, row = np.unique(objects.category, return_inverse=True)
-        samples = np.zeros((len(classes), count, 3))
-        grids = np.zeros((len(classes), CELLS, CELLS, CELLS), bool)
-        for i, c in enumerate(classes):
-            samples[i] = interior_samples(models[c - 1], count)
-            grids[i] = occupancy(models[c - 1])
+        kinds, row = np.unique(np.column_stack([objects.category, objects.member]), axis=0,
+                               return_inverse=True)
+        samples = np.zeros((len(kinds), count, 3))
+        grids = np.zeros((len(kinds), CELLS, CELLS, CELLS), bool)
+        for i, (c, member) in enumerate(kinds):
+            shape = models[c - 1].members[member]
+            samples[i], grids[i] = interior_samples(shape, count), occupancy(shape)
         R = (Rotation.from_quat(objects.rotation_xyzw).as_matrix() if n
              else np.zeros((0, 3, 3)))
         size = np.maximum(objects.size.astype(np.float64), 1e-9)
         pairs = _meeting_pairs(R, objects.translation, size)
         bits = np.zeros((len(pairs), count // 64), np.uint64)
-        kernels.sample_bits(pairs, row.astype(np.int32), R, objects.translation, size, samples,
+        kernels.sample_bits(pairs, row.reshape(-1).astype(np.int32), R, objects.translation, size, samples,
                             grids, bits)
         # Keep pairs with a common volume, both directions, ordered by the first.
         mirror = np.lexsort((pairs[:, 0], pairs[:, 1]))

@@ -31,6 +31,7 @@ from hooc_perception.core.frame.kernels.residue import PatchPixels, ResidueSetti
 from hooc_perception.core.frame.pixel_index import first_pixels, rows_of_pixels, stacked_index
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.render import is_closed
+from hooc_perception.core.shapes import Shapes
 from hooc_perception.core.types import (
     Candidates,
     GenericModel,
@@ -48,53 +49,54 @@ class Evidence:
     """
     The views of one frame set, laid out for the kernels.
 
-    :ivar views: Views, the stacked pixels; `meshes` Meshes of the models.
+    :ivar views: Views, the stacked pixels; `shapes` the meshes, `meshes` the
+        same for the kernels.
     :ivar scale: pixels here per pixel of the full images: costs shrink with them.
     :ivar row: (P,) int32 row of the cloud that each pixel fell into, -1 = none.
     :ivar cost_none: (P,) float32 cost of showing nothing; `nothing` the Context without members.
     """
 
     def __init__(self, observation: Observation, probabilities: PixelProbabilities,
-                 models: Sequence[GenericModel], cloud: Cloud, patch: Int32Array,
-                 stride: int = 1) -> None:
+                 shapes: Shapes, cloud: Cloud, patch: Int32Array, stride: int = 1) -> None:
         """
         Stack every `stride`-th row and column of all views.
 
+        :param shapes: the meshes that hypotheses name.
         :param cloud: Cloud of the observation; `patch` (n,) labels of its points.
         """
         self.scale = 1.0 / (stride * stride)
         self.row = _stacked(cloud.row, stride)
         self.n_points = len(patch)
         self.views = _views_of(observation, probabilities, cloud, _labels(patch, self.row), stride)
-        self.meshes = _meshes_of(models)
+        self.shapes, self.meshes = shapes, _meshes_of(shapes.models)
         self.cost_none: Float32Array = self.views.foreground.astype(np.float32)
         n = len(self.cost_none)
         far = np.full(n, np.inf, np.float32)
         self.nothing = Context(np.full(n, -2, np.int32), far, self.cost_none, far, self.cost_none)
 
-    def compare(self, hypotheses: Float64Array, category: AnyArray, weights: PixelWeights,
+    def compare(self, hypotheses: Float64Array, shape: AnyArray, weights: PixelWeights,
                 context: Context | None = None, me: AnyArray | Sequence[int] | None = None,
                 ) -> Float64Array:
         """
         Render hypotheses and compare them with all views, each by itself.
 
         :param hypotheses: (m, 10+) float64, see core/kernels/pose.py.
-        :param category: (m,) class ids.
+        :param shape: (m,) numbers of their meshes in `shapes`.
         :param context: what is shown already, from `compose`; None = nothing.
         :param me: (m,) the number of each in `context`, which is looked through; -1 = none.
         :return: stats (m, STATS) float64; frame/kernels/compare.py names the columns.
         """
-        subjects = _hypotheses(hypotheses, category, me)
+        subjects = self._subjects(hypotheses, shape, me)
         nowhere = PixelOutput(np.full(len(subjects.rows), -1), *_pixel_arrays(0))
         return kernel.compare_all(subjects, self.views, self.meshes, context or self.nothing,
                                   _as_floats(weights), nowhere)[0]
 
-    def compare_pixels(self, hypotheses: Float64Array, category: AnyArray, weights: PixelWeights,
+    def compare_pixels(self, hypotheses: Float64Array, shape: AnyArray, weights: PixelWeights,
                        context: Context | None = None,
                        me: AnyArray | Sequence[int] | None = None,
                        ) -> tuple[Float64Array, PixelLists]:
         """Return the stats of `compare`, and the pixels that each hypothesis covers."""
-        subjects = _hypotheses(hypotheses, category, me)
+        subjects = self._subjects(hypotheses, shape, me)
         # Room for all pixels of their windows; what is never written to takes no memory.
         room = pixel_lists.window_areas(subjects, self.meshes, self.views)
         output = PixelOutput(np.cumsum(room) - room, *_pixel_arrays(room.sum()))
@@ -117,6 +119,14 @@ class Evidence:
             (0.5 * size + reach).astype(np.float64),
             ResidueSettings(float(costs.residue_cost), float(costs.residue_share),
                             float(costs.residue_behind_m))))
+
+    def _subjects(self, rows: Float64Array, shape: AnyArray,
+                  me: AnyArray | Sequence[int] | None) -> Hypotheses:
+        """Return Hypotheses as the kernels take them."""
+        shape = np.ascontiguousarray(shape, np.int64)
+        return Hypotheses(np.ascontiguousarray(rows[:, :10], np.float64), shape,
+                          self.shapes.category[shape],
+                          np.full(len(rows), -1) if me is None else np.asarray(me, np.int64))
 
     @cached_property
     def _patch_pixels(self) -> PatchPixels:
@@ -142,7 +152,7 @@ class Evidence:
         left = np.bincount(self.row[seen], weights=cost > UNEXPLAINED, minlength=self.n_points)
         return left / np.maximum(total, 1)
 
-    def refine(self, hypotheses: Float64Array, category: AnyArray, weights: PixelWeights,
+    def refine(self, hypotheses: Float64Array, shape: AnyArray, weights: PixelWeights,
                settings: RefineSettings, rng: np.random.Generator,
                context: Context | None = None, me: AnyArray | Sequence[int] | None = None,
                ) -> Float64Array:
@@ -155,7 +165,7 @@ class Evidence:
         # numba compiles a function anew for every combination of types.
         settings = RefineSettings(float(settings.complexity), float(settings.size_prior),
                                   int(settings.steps), *map(float, settings[3:]))
-        subjects = _hypotheses(hypotheses, category, me)
+        subjects = self._subjects(hypotheses, shape, me)
         subjects = subjects._replace(rows=subjects.rows.copy())
         seeds = rng.integers(0, 2**31, len(subjects.rows))
         # Nobody asks for SHARE here.
@@ -165,9 +175,9 @@ class Evidence:
         return subjects.rows
 
 
-def hypotheses_of(candidates: Candidates, models: Sequence[GenericModel]) -> Float64Array:
+def hypotheses_of(candidates: Candidates, shapes: Shapes) -> Float64Array:
     """Return (n, 10) float64 hypotheses of Candidates: translation, xyzw, scale per axis."""
-    extents = np.array([models[c - 1].extents for c in candidates.category]).reshape(-1, 3)
+    extents = shapes.extents[shapes.of(candidates)]
     return np.column_stack([candidates.translation, candidates.rotation_xyzw,
                             candidates.size / np.maximum(extents, 1e-9)]).astype(np.float64)
 
@@ -210,21 +220,13 @@ def _views_of(observation: Observation, probabilities: PixelProbabilities, cloud
 
 
 def _meshes_of(models: Sequence[GenericModel]) -> Meshes:
-    """Return the Meshes of the models."""
+    """Return the Meshes of GenericModels, without their variants."""
     return Meshes(
         vertices=np.concatenate([m.vertices for m in models]),
         vertex_start=np.cumsum([0] + [len(m.vertices) for m in models]),
         faces=np.concatenate([m.faces for m in models]).astype(np.int32),
         face_start=np.cumsum([0] + [len(m.faces) for m in models]),
         closed=np.array([is_closed(m) for m in models]))
-
-
-def _hypotheses(rows: Float64Array, category: AnyArray,
-                me: AnyArray | Sequence[int] | None) -> Hypotheses:
-    """Return Hypotheses as the kernels take them."""
-    return Hypotheses(np.ascontiguousarray(rows[:, :10], np.float64),
-                      np.ascontiguousarray(category, np.int64),
-                      np.full(len(rows), -1) if me is None else np.asarray(me, np.int64))
 
 
 def _pixel_arrays(n: int) -> tuple[Int64Array, Float32Array, Float32Array]:

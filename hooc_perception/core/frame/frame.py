@@ -9,6 +9,7 @@ from hooc_perception.core.arrays import Int32Array
 from hooc_perception.core.frame.evidence import Evidence
 from hooc_perception.core.frame.field import build_field, Cloud, Field, fuse_cloud
 from hooc_perception.core.frame.patches import smooth_patches
+from hooc_perception.core.shapes import Shapes
 from hooc_perception.core.types import GenericModel, Observation, PixelProbabilities
 
 
@@ -59,6 +60,11 @@ class Frame:
         """Return every fourth row and column of all views."""
         return self._evidence(4)
 
+    @cached_property
+    def shapes(self) -> Shapes:
+        """Return all meshes of the models' families."""
+        return Shapes(self.models)
+
     def _evidence(self, stride: int) -> Evidence:
-        return Evidence(self.observation, self.probabilities, self.models, self.cloud,
+        return Evidence(self.observation, self.probabilities, self.shapes, self.cloud,
                         self.patch, stride)

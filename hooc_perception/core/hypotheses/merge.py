@@ -39,11 +39,11 @@ def merged_pairs(objects: Candidates, models: Sequence[GenericModel],
     if not rows:
         return Candidates.empty(), np.zeros((0, 2), np.int64)
     base = np.array([i for i, _, _ in rows])
-    extents = np.array([models[c - 1].extents for c in objects.category[base]])
     like = objects.take(base)
+    extents = np.array([shape.extents for shape in like.shapes(models)])
     size = np.clip([s for _, _, s in rows], SCALE_LIMITS[0] * extents, SCALE_LIMITS[1] * extents)
     return Candidates(like.category, np.array([t for _, t, _ in rows]), like.rotation_xyzw, size,
-                      like.score), np.array(pairs)
+                      like.score, like.member), np.array(pairs)
 
 
 def _around(objects: Candidates, R: Float64Array, i: int, j: int,

@@ -7,7 +7,7 @@ Hypotheses are sampled and refined in the voxel field (sampling.py), then ranked
 ranked again in the images.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -25,7 +25,8 @@ from hooc_perception.core.hypotheses.sampling import (
     SampleCounts,
 )
 from hooc_perception.core.kernels.pose import QUATERNION, SCALE, SCORE, TRANSLATION, WIDTH
-from hooc_perception.core.types import Candidates, GenericModel
+from hooc_perception.core.shapes import Shapes
+from hooc_perception.core.types import Candidates
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -56,10 +57,10 @@ def propose(frame: Frame, config: ProposeConfig, costs: PixelCosts,
     """
     if frame.field is None:
         return Candidates.empty()
-    H, category = sample(frame.cloud, frame.field, frame.models, config, rng,
-                         SampleCounts(config.samples, config.pool, config.refine_steps))
+    H, shape = sample(frame.cloud, frame.field, frame.shapes, config, rng,
+                      SampleCounts(config.samples, config.pool, config.refine_steps))
     return _ranked(frame, _Ranking(config, costs, config.polish, config.per_category), rng, H,
-                   category, lambda evidence: evidence.nothing)
+                   shape, lambda evidence: evidence.nothing)
 
 
 def propose_more(frame: Frame, objects: Candidates, config: ProposeConfig, costs: PixelCosts,
@@ -70,55 +71,55 @@ def propose_more(frame: Frame, objects: Candidates, config: ProposeConfig, costs
 
     @cache
     def shown(evidence: Evidence) -> Context:
-        _, lists = evidence.compare_pixels(hypotheses_of(objects, frame.models),
-                                           objects.category, costs.weights())
+        _, lists = evidence.compare_pixels(hypotheses_of(objects, frame.shapes),
+                                           frame.shapes.of(objects), costs.weights())
         return evidence.compose(np.arange(len(objects)), lists)
 
     left = frame.coarse.unexplained(shown(frame.coarse))
     if not left.any():
         return Candidates.empty()
-    H, category = sample(
-        frame.cloud, frame.field, frame.models, config, rng,
+    H, shape = sample(
+        frame.cloud, frame.field, frame.shapes, config, rng,
         SampleCounts(config.round_samples, config.round_pool, config.refine_steps), left + 0.02)
     few = config.round_per_category
-    return _ranked(frame, _Ranking(config, costs, few, few), rng, H, category, shown)
+    return _ranked(frame, _Ranking(config, costs, few, few), rng, H, shape, shown)
 
 
 def _ranked(frame: Frame, ranking: _Ranking, rng: np.random.Generator, H: Float64Array,
-            category: Int64Array, shown: Callable[[Evidence], Context]) -> Candidates:
+            shape: Int64Array, shown: Callable[[Evidence], Context]) -> Candidates:
     """
     Rank hypotheses in the images, refine the best there and return the best of those.
 
-    :param H: (m, 11) hypotheses with their score in the voxel field; `category` (m,).
+    :param H: (m, 11) hypotheses with their score in the voxel field; `shape` (m,) their meshes.
     :param shown: Evidence -> the context of what is explained already.
     """
-    models, config, coarse = frame.models, ranking.config, frame.coarse
+    shapes, config, coarse = frame.shapes, ranking.config, frame.coarse
     weights = ranking.costs.weights()
-    stats = coarse.compare(H, category, weights, shown(coarse))
+    stats = coarse.compare(H, shape, weights, shown(coarse))
     score = benefit(stats, config.complexity)
     # Half of the places go to the field's own order: it knows what the images hide.
     rows = np.union1d(
-        non_maximum_suppression(H, category, score, models, ranking.n_refine),
-        non_maximum_suppression(H, category, H[:, SCORE], models, ranking.n_refine // 2))
-    H, category, covered = H[rows], category[rows], stats[rows, stat.SHOWN]
+        non_maximum_suppression(H, shape, score, shapes, ranking.n_refine),
+        non_maximum_suppression(H, shape, H[:, SCORE], shapes, ranking.n_refine // 2))
+    H, shape, covered = H[rows], shape[rows], stats[rows, stat.SHOWN]
     settings = RefineSettings(config.complexity, SIZE_PRIOR, config.polish_steps, *STEP_SIZES)
     # A few hundred pixels determine a pose: large objects need no more, thin ones need them all.
     for evidence, low, high in ((frame.evidence, 0, MANY), (coarse, MANY, 8 * MANY),
                                 (frame.coarsest, 8 * MANY, np.inf)):
         mine = np.flatnonzero((low <= covered) & (covered < high))
         if config.polish_steps and len(mine):
-            H[mine, :WIDTH] = evidence.refine(H[mine], category[mine], weights, settings, rng,
+            H[mine, :WIDTH] = evidence.refine(H[mine], shape[mine], weights, settings, rng,
                                               shown(evidence))
-    score = benefit(coarse.compare(H, category, weights, shown(coarse)), config.complexity)
-    rows = non_maximum_suppression(H, category, score, models, ranking.n_keep)
-    return candidates_of(H[rows], category[rows], score[rows], models)
+    score = benefit(coarse.compare(H, shape, weights, shown(coarse)), config.complexity)
+    rows = non_maximum_suppression(H, shape, score, shapes, ranking.n_keep)
+    return candidates_of(H[rows], shape[rows], score[rows], shapes)
 
 
-def candidates_of(H: Float64Array, category: AnyArray, score: AnyArray,
-                  models: Sequence[GenericModel]) -> Candidates:
-    """Return Candidates from hypotheses (m, 10+), class ids and scores."""
-    extents = np.array([models[c - 1].extents for c in category]).reshape(-1, 3)
-    return Candidates(category.astype(np.uint16), H[:, TRANSLATION].copy(),
+def candidates_of(H: Float64Array, shape: Int64Array, score: AnyArray,
+                  shapes: Shapes) -> Candidates:
+    """Return Candidates from hypotheses (m, 10+), the numbers of their meshes, and scores."""
+    return Candidates(shapes.category[shape].astype(np.uint16), H[:, TRANSLATION].copy(),
                       Rotation.from_quat(H[:, QUATERNION]).as_quat() if len(H)
                       else H[:, QUATERNION].copy(),
-                      (H[:, SCALE] * extents).astype(np.float32), score.astype(np.float32))
+                      (H[:, SCALE] * shapes.extents[shape]).astype(np.float32),
+                      score.astype(np.float32), shapes.member[shape])

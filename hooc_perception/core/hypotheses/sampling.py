@@ -11,7 +11,7 @@ field; what is left is then ranked in the images.
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from hooc_perception.core.arrays import AnyArray, Float64Array, Int64Array
+from hooc_perception.core.arrays import Float64Array, Int64Array
 from hooc_perception.core.frame.field import Cloud
 from hooc_perception.core.frame.kernels import compare as stat
 from hooc_perception.core.frame.kernels.records import Field
@@ -27,8 +27,9 @@ from hooc_perception.core.hypotheses.kernels.records import (
 from hooc_perception.core.hypotheses.kernels.refinement import refine_all
 from hooc_perception.core.hypotheses.kernels.scoring import quick_field
 from hooc_perception.core.hypotheses.kernels.suppression import suppress_near_duplicates
-from hooc_perception.core.kernels.pose import SCORE, WIDTH
+from hooc_perception.core.kernels.pose import SCALE, SCORE, WIDTH
 from hooc_perception.core.memo import per_model
+from hooc_perception.core.shapes import Shapes
 from hooc_perception.core.types import GenericModel
 import numpy as np
 
@@ -52,7 +53,8 @@ class SampleCounts(NamedTuple):
     """
     How many hypotheses are drawn.
 
-    :ivar samples: drawn per category; `keep` of them are refined.
+    :ivar samples: drawn per category; `keep` of them are refined. The members of a family share
+        them.
     :ivar refine_steps: trials per refinement.
     """
 
@@ -62,7 +64,7 @@ class SampleCounts(NamedTuple):
 
 
 def tables(models: Sequence[GenericModel]) -> ModelTables:
-    """Return the models' surface points and resting rotations, stacked for the kernels."""
+    """Return the meshes' surface points and resting rotations, stacked for the kernels."""
     most = max(len(m.rest_rotations) for m in models)
     rest = np.zeros((len(models), most, 4))
     cdf = np.zeros((len(models), most))
@@ -85,51 +87,49 @@ def _surface(model: GenericModel) -> tuple[Float64Array, Float64Array]:
             model.surface_normals[rows].astype(np.float64))
 
 
-def sample(cloud: Cloud, field: Field, models: Sequence[GenericModel], config: ProposeConfig,
+def sample(cloud: Cloud, field: Field, shapes: Shapes, config: ProposeConfig,
            rng: np.random.Generator, counts: SampleCounts, weight: Float64Array | None = None,
-           extra: tuple[Float64Array, AnyArray] | None = None) -> tuple[Float64Array, Int64Array]:
+           ) -> tuple[Float64Array, Int64Array]:
     """
-    Return hypotheses (m, 11), scores in the last column, and their categories (m,).
+    Return hypotheses (m, 11), scores in the last column, and the numbers of their meshes (m,).
 
-    Of every model the best of every cell of the table are drawn and then refined in the field.
+    Of every mesh the best of every cell of the table are drawn and then refined in the field.
 
-    :param weight: (n,) or (models, n) how likely each point of the cloud is drawn.
-    :param extra: (hypotheses (k, 10), categories (k,)) from elsewhere, to be refined with them;
-        those that do not fit the field at all are left out.
+    :param weight: (n,) how likely each point of the cloud is drawn.
     """
-    t, weights = tables(models), ScoreWeights(
+    t, weights = tables(shapes.models), ScoreWeights(
         float(config.free_weight), float(config.shell_weight), float(config.size_prior))
-    drawn = sample_all(
-        rng.integers(0, 2**31, len(models)), t, Surface(cloud.points, cloud.normals),
-        _scene_cdf(cloud, len(models), config.distrust, weight), field, quick_field(field.data),
-        weights, DrawSettings(counts.samples, counts.keep, float(config.size_sigma),
-                              float(config.tilted), QUICK_POINTS, SCORE_POINTS))
-    H = drawn.reshape(-1, WIDTH + 1)
-    model_of = np.repeat(np.arange(len(models)), counts.keep)
+    cdf = _scene_cdf(cloud, config.distrust, weight)
+    scene, quick = Surface(cloud.points, cloud.normals), quick_field(field.data)
+    seeds = rng.integers(0, 2**31, len(shapes))
+    parts, shape_of = [], []
+    # Families of one size are drawn together: they share the samples of a category alike.
+    for size in np.unique(shapes.family):
+        mine = np.flatnonzero(shapes.family == size)
+        samples, keep = (-(-count // int(size)) for count in (counts.samples, counts.keep))
+        drawn = sample_all(
+            seeds[mine], ModelTables(*(rows[mine] for rows in t)), scene,
+            cdf[shapes.category[mine] - 1], field, quick, weights,
+            DrawSettings(samples, keep, float(config.size_sigma), float(config.tilted),
+                         QUICK_POINTS, SCORE_POINTS))
+        parts.append(drawn.reshape(-1, WIDTH + 1))
+        shape_of.append(np.repeat(mine, keep))
+    H, shape = np.concatenate(parts), np.concatenate(shape_of)
     filled = np.isfinite(H[:, SCORE])
-    H, model_of = np.ascontiguousarray(H[filled]), model_of[filled]
-    drawn_here = len(H)
-    if extra is not None:
-        H = np.concatenate([H, np.column_stack([extra[0], np.zeros(len(extra[0]))])])
-        model_of = np.concatenate([model_of, extra[1].astype(np.int64) - 1])
-    refine_all(rng.integers(0, 2**31, len(H)), H, model_of, t, field, weights,
+    H, shape = np.ascontiguousarray(H[filled]), shape[filled]
+    refine_all(rng.integers(0, 2**31, len(H)), H, shape, t, field, weights,
                FieldRefineSettings(REFINE_POINTS, counts.refine_steps, *STEP_SIZES))
-    fits = (np.arange(len(H)) < drawn_here) | (H[:, SCORE] > 0)
-    return H[fits], model_of[fits] + 1
+    return H, shape
 
 
-def _scene_cdf(cloud: Cloud, n_models: int, distrust: float,
-               weight: Float64Array | None) -> Float64Array:
-    """Return (models, n) float64 cumulative weights of the cloud's points for each model."""
+def _scene_cdf(cloud: Cloud, distrust: float, weight: Float64Array | None) -> Float64Array:
+    """Return (N, n) float64 cumulative weights of the cloud's points for each category."""
     n = len(cloud.points)
     if weight is None:
         weight = np.ones(n)
-    if cloud.p.shape[1] > 1:
-        # Draws follow the classifier, but no point is ruled out.
-        likely = cloud.p[:, 1:].T.astype(np.float64)
-        weight = weight * (likely + distrust)
-    weight = np.broadcast_to(weight, (n_models, n))
-    return np.ascontiguousarray(np.cumsum(weight, 1))
+    # Draws follow the classifier, but no point is ruled out.
+    likely = cloud.p[:, 1:].T.astype(np.float64)
+    return np.ascontiguousarray(np.cumsum(weight * (likely + distrust), 1))
 
 
 def benefit(stats: Float64Array, complexity: float) -> Float64Array:
@@ -149,18 +149,21 @@ def benefit(stats: Float64Array, complexity: float) -> Float64Array:
     return (np.maximum(gain, 0) * share + loss) / (seen + PIXEL_PRIOR)
 
 
-def non_maximum_suppression(H: Float64Array, category: Int64Array, score: Float64Array,
-                            models: Sequence[GenericModel], most: int) -> Int64Array:
+def non_maximum_suppression(H: Float64Array, shape: Int64Array, score: Float64Array,
+                            shapes: Shapes, most: int) -> Int64Array:
     """
     Return the rows of the best `most` per category, without near duplicates of better ones.
 
-    Duplicates agree in place, rotation and size; the same place with another size is kept.
+    Duplicates agree in place, rotation and size; the same place with another size is kept. Of
+    the members of a family that lie there alike only the best is.
     """
-    H = np.ascontiguousarray(H[:, :WIDTH], np.float64)
+    H = np.array(H[:, :WIDTH], np.float64)
+    H[:, SCALE] *= shapes.extents[shape]
+    category, longest = shapes.category[shape], shapes.extents.max(1)
     rows = []
     for c in np.unique(category):
         mine = np.flatnonzero(category == c)
         mine = mine[np.argsort(-score[mine], kind='stable')]
-        reach = DUPLICATE_REACH * models[c - 1].longest_side
+        reach = DUPLICATE_REACH * longest[shape[mine[0]]]
         rows.append(mine[suppress_near_duplicates(H[mine], reach, most)])
     return np.concatenate(rows) if rows else np.zeros(0, np.int64)

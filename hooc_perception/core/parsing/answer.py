@@ -54,10 +54,10 @@ def parsed_scene(frame: Frame, choice: Choice, costs: PixelCosts) -> ParsedScene
         return ParsedScene(objects, energy, none, none, none, np.zeros(0, np.uint8), considered,
                            choice.converged)
     evidence, weights = frame.evidence, costs.weights()
-    H = hypotheses_of(objects, frame.models)
-    _, lists = evidence.compare_pixels(H, objects.category, weights)
+    H, shape = hypotheses_of(objects, frame.shapes), frame.shapes.of(objects)
+    _, lists = evidence.compare_pixels(H, shape, weights)
     context = evidence.compose(np.arange(n), lists)
-    stats = evidence.compare(H, objects.category, weights, context, np.arange(n))
+    stats = evidence.compare(H, shape, weights, context, np.arange(n))
     alone = np.maximum(stats[:, stat.SHOWN], 1)
     seen = alone - stats[:, stat.BEHIND]
     agree = stats[:, stat.AGREE]

@@ -3,6 +3,7 @@
 """The joint search of stage 4: choose, refine, propose again, until nothing improves."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.energy.joint import JointEnergy
@@ -49,6 +50,7 @@ def search_scene(frame: Frame, pool: Candidates, config: ParseConfig, rng: np.ra
         search.merge_pairs(rng)
         last = turn == config.rounds
         new = search.refined_copies(config.turn_steps if last else config.polish_steps, rng, last)
+        new = new.extended(search.exchanged_members(config.member_steps, rng))
         if more is not None and not last and not late():
             new = new.extended(more(search.chosen, turn + 1))
         considered = considered.extended(new)
@@ -77,7 +79,8 @@ class Search:
         self.max_instances = max_instances
         self.pool, self.mask = Candidates.empty(), np.zeros(0, bool)
         self.stats, self.lists = evidence.compare_pixels(
-            hypotheses_of(self.pool, models), self.pool.category, config.pixels.weights())
+            hypotheses_of(self.pool, evidence.shapes), evidence.shapes.of(self.pool),
+            config.pixels.weights())
         self._penalty: Float64Array | None = None
         self._energy: JointEnergy | None = None
 
@@ -97,8 +100,9 @@ class Search:
         """Add Candidates to the pool; none of them is chosen yet."""
         if not len(new):
             return
-        H = hypotheses_of(new, self.models)
-        stats, lists = self.evidence.compare_pixels(H, new.category,
+        shapes = self.evidence.shapes
+        H = hypotheses_of(new, shapes)
+        stats, lists = self.evidence.compare_pixels(H, shapes.of(new),
                                                     self.config.pixels.weights())
         lists = self.evidence.with_residue(lists, H, new.size, self.config.residue)
         first = not len(self.pool)
@@ -130,6 +134,20 @@ class Search:
         if not len(chosen) or not steps:
             return Candidates.empty()
         return self._refined(start, chosen, context, steps, rng)
+
+    def exchanged_members(self, steps: int, rng: np.random.Generator) -> Candidates:
+        """Return refined copies of the chosen candidates with each other mesh of their family."""
+        chosen = np.flatnonzero(self.mask)
+        objects, shapes = self.pool.take(chosen), self.evidence.shapes
+        family = shapes.family[shapes.of(objects)]
+        rows = np.repeat(np.arange(len(chosen)), family - 1)
+        if not len(rows) or not steps:
+            return Candidates.empty()
+        member = np.concatenate([np.setdiff1d(np.arange(n), [own])
+                                 for n, own in zip(family, objects.member)])
+        start = replace(objects.take(rows), member=member.astype(np.uint16))
+        context = self.evidence.compose(chosen, self.lists)
+        return self._refined(start, chosen[rows], context, steps, rng)
 
     def merge_pairs(self, rng: np.random.Generator) -> None:
         """Replace two chosen objects of one category by one where that costs less."""
@@ -193,11 +211,11 @@ class Search:
     def _refined(self, start: Candidates, own: Sequence[int] | np.ndarray, context: Context,
                  steps: int, rng: np.random.Generator) -> Candidates:
         """Return `start`, each row refined in its context; see Evidence.refine."""
-        costs = self.config.objects
+        costs, shapes = self.config.objects, self.evidence.shapes
         H = self.evidence.refine(
-            hypotheses_of(start, self.models), start.category, self.config.pixels.weights(),
+            hypotheses_of(start, shapes), shapes.of(start), self.config.pixels.weights(),
             RefineSettings(costs.complexity, costs.size_prior, steps, *STEPS), rng, context, own)
-        return candidates_of(H, start.category, start.score, self.models)
+        return candidates_of(H, shapes.of(start), start.score, shapes)
 
     def _build_energy(self) -> JointEnergy:
         energy = JointEnergy(self.evidence, self.pool, self.stats, self.lists, self.models,

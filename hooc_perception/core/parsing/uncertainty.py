@@ -60,7 +60,7 @@ def pose_uncertainty(frame: Frame, parsed: ParsedScene, pixels: PixelCosts,
         return np.zeros((2, 0), np.float32)
     models = frame.models
     cost = _Cost(frame.coarse, objects, models, pixels, costs)
-    longest = np.array([models[c - 1].longest_side for c in objects.category])
+    longest = np.array([shape.longest_side for shape in objects.shapes(models)])
     information = _information(cost, longest)
     flipped = _flip_probabilities(cost, objects, models, rng)
     out = np.full((2, n), np.nan, np.float32)
@@ -73,7 +73,7 @@ def pose_uncertainty(frame: Frame, parsed: ParsedScene, pixels: PixelCosts,
         # Errors spread wider than least squares think: sigma goes with the variance.
         variance = np.trace(covariance[:3, :3]) + (SHAPE * longest[k]) ** 2
         out[0, k] = min(PER_SQUARE_M * variance, longest[k])
-        symmetry = models[int(objects.category[k]) - 1].symmetry
+        symmetry = models[int(objects.category[k]) - 1].members[int(objects.member[k])].symmetry
         if is_ball(symmetry):
             continue
         turning = covariance[3:6, 3:6]
@@ -97,14 +97,13 @@ class _Cost:
         """Compose the objects."""
         self.evidence, self.costs = evidence, costs
         self.weights = pixels.weights()
-        self.H = hypotheses_of(objects, models)
-        self.category = objects.category.astype(np.int64)
-        _, lists = evidence.compare_pixels(self.H, self.category, self.weights)
+        self.H, self.shape = hypotheses_of(objects, evidence.shapes), evidence.shapes.of(objects)
+        _, lists = evidence.compare_pixels(self.H, self.shape, self.weights)
         self.context = evidence.compose(np.arange(len(objects)), lists)
 
     def of(self, H: Float64Array, own: Int64Array) -> tuple[Float64Array, Float64Array]:
         """Return (m,) costs in pixels of the full images, and (m,) pixels that are shown."""
-        stats = self.evidence.compare(H, self.category[own], self.weights, self.context, own)
+        stats = self.evidence.compare(H, self.shape[own], self.weights, self.context, own)
         prior = self.costs.size_prior * (np.log(H[:, 7:10]) ** 2).sum(1)
         shown = stats[:, stat.SHOWN] / self.evidence.scale
         return (stats[:, stat.DELTA] / self.evidence.scale
@@ -114,7 +113,7 @@ class _Cost:
         """Return hypotheses refined for some steps, each in place of its object."""
         c = self.costs
         return self.evidence.refine(
-            H, self.category[own], self.weights,
+            H, self.shape[own], self.weights,
             RefineSettings(c.complexity, c.size_prior, POLISH_STEPS, *STEPS), rng, self.context,
             own)
 
@@ -141,7 +140,7 @@ def _information(cost: _Cost, longest: Float64Array) -> Float64Array:
     H[:, 3:7] = (Rotation.from_rotvec(flat[:, 3:6] / half)
                  * Rotation.from_quat(H[:, 3:7])).as_quat()
     H[:, 7:10] *= np.exp(flat[:, 6:9] / half)
-    _, lists = evidence.compare_pixels(H, cost.category[own], cost.weights, cost.context, own)
+    _, lists = evidence.compare_pixels(H, cost.shape[own], cost.weights, cost.context, own)
     residual = np.clip((lists.depth - evidence.views.depth[lists.pixel]) / tolerance, -1, 1)
     out = np.zeros((n, 9, 9))
     for k in range(n):
@@ -160,7 +159,7 @@ def _flip_probabilities(cost: _Cost, objects: Candidates, models: Sequence[Gener
                         rng: np.random.Generator) -> Float64Array:
     """Return (n,) how likely a half turn of the answer is the true orientation."""
     turned, rows = half_turns(objects, models)
-    H = np.concatenate([cost.H, hypotheses_of(turned, models)])
+    H = np.concatenate([cost.H, hypotheses_of(turned, cost.evidence.shapes)])
     own = np.concatenate([np.arange(len(objects)), rows])
     costs, shown = cost.of(cost.refined(H, own, rng), own)
     out, n = np.zeros(len(objects)), len(objects)

@@ -24,7 +24,7 @@ def unexplained_points(observation: Observation, objects: Candidates,
     """
     meshes = []
     for i in range(len(objects)):
-        model = models[int(objects.category[i]) - 1]
+        model = models[int(objects.category[i]) - 1].members[int(objects.member[i])]
         meshes.append((posed_vertices(model, objects.translation[i], objects.rotation_xyzw[i],
                                       objects.size[i]), model.faces))
     left = []

@@ -95,7 +95,7 @@ def margins(energy: JointEnergy, siblings: BoolArray) -> Float64Array:
 
 def siblings_of(pool: Candidates, models: Sequence[GenericModel]) -> BoolArray:
     """Return (n, n) bool: same category, centres within 0.35 of the model's longest side."""
-    reach = 0.35 * np.array([models[c - 1].longest_side for c in pool.category])
+    reach = 0.35 * np.array([shape.longest_side for shape in pool.shapes(models)])
     apart = np.linalg.norm(pool.translation[:, None] - pool.translation[None], axis=2)
     return (pool.category[:, None] == pool.category[None]) & (apart < reach[:, None])
 
@@ -109,7 +109,7 @@ def features(search: Search) -> Float32Array:
     margin = margins(search.energy, siblings_of(pool, models)) / evidence.scale
     shown = np.maximum(stats[:, kernel.SHOWN], 1)
     agree = np.maximum(stats[:, kernel.AGREE], 1)
-    extents = np.array([models[c - 1].extents for c in pool.category])
+    extents = np.array([shape.extents for shape in pool.shapes(models)])
     scale = np.log(pool.size / np.maximum(extents, 1e-9))
     p, foreground = _opinions(evidence, search.lists, n)
     own = p[np.arange(n), pool.category]

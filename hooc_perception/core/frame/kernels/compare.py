@@ -234,13 +234,13 @@ def _compare_view(subject: Subject, target: Target, view: int, sums: Sums, at: i
 
 
 @nb.njit(cache=True, error_model='numpy')
-def compare_one(h: Float64Array, category: int, me: int, target: Target, stats: Float64Array,
-                equations: Float64Array, start: int, output: PixelOutput) -> int:
+def compare_one(hypotheses: Hypotheses, k: int, h: Float64Array, target: Target,
+                stats: Float64Array, equations: Float64Array, start: int,
+                output: PixelOutput) -> int:
     """
     Compare one hypothesis with all views.
 
-    :param h: (10,) float64; `category` its class id.
-    :param me: its own number in the context, which is looked through; -1 = none.
+    :param hypotheses: row k of it says which mesh and category; `h` (10,) float64 where it is.
     :param stats: (STATS,) float64, filled. SHARE stays 0 where the views have no patch_size.
     :param equations: (9, 10) float64, filled with the Gauss-Newton equations of the agreeing
         pixels, see core/kernels/gauss_newton.py; (0, 0) = not wanted.
@@ -248,12 +248,14 @@ def compare_one(h: Float64Array, category: int, me: int, target: Target, stats: 
     :return: where the next one would go.
     """
     meshes, views = target.meshes, target.views
-    vertices = meshes.vertices[meshes.vertex_start[category - 1]:meshes.vertex_start[category]]
-    faces = meshes.faces[meshes.face_start[category - 1]:meshes.face_start[category]]
+    s = hypotheses.shape[k]
+    vertices = meshes.vertices[meshes.vertex_start[s]:meshes.vertex_start[s + 1]]
+    faces = meshes.faces[meshes.face_start[s]:meshes.face_start[s + 1]]
     R, world = np.empty((3, 3)), np.empty(vertices.shape)
     rotation_of(h, R)
     posed(h, vertices, world)
-    subject = Subject(h, R, world, faces, meshes.closed[category - 1], category, me)
+    subject = Subject(h, R, world, faces, meshes.closed[s], hypotheses.category[k],
+                      hypotheses.me[k])
     stats[:] = 0.0
     equations[:] = 0.0
     sums = Sums(stats, equations, np.full(MAX_PATCHES, -1), np.zeros(MAX_PATCHES))
@@ -281,6 +283,6 @@ def compare_all(hypotheses: Hypotheses, views: Views, meshes: Meshes, context: C
     for k in nb.prange(m):
         target = Target(views, meshes, context, weights)
         start = output.start[k]
-        n[k] = compare_one(hypotheses.rows[k], hypotheses.category[k], hypotheses.me[k], target,
-                           stats[k], np.empty((0, 0)), start, output) - start
+        n[k] = compare_one(hypotheses, k, hypotheses.rows[k], target, stats[k],
+                           np.empty((0, 0)), start, output) - start
     return stats, n

@@ -69,8 +69,8 @@ def window_areas(hypotheses: Hypotheses, meshes: Meshes, views: Views) -> Int64A
     m = hypotheses.rows.shape[0]
     out = np.zeros(m, np.int64)
     for k in nb.prange(m):
-        c = hypotheses.category[k]
-        V = meshes.vertices[meshes.vertex_start[c - 1]:meshes.vertex_start[c]]
+        s = hypotheses.shape[k]
+        V = meshes.vertices[meshes.vertex_start[s]:meshes.vertex_start[s + 1]]
         world = np.empty(V.shape)
         posed(hypotheses.rows[k], V, world)
         for v in range(views.K.shape[0]):

@@ -52,11 +52,11 @@ class Views(NamedTuple):
 
 class Meshes(NamedTuple):
     """
-    The generic models' meshes, concatenated; category c has rows start[c - 1] to start[c] - 1.
+    All S meshes, concatenated; mesh s has rows start[s] to start[s + 1] - 1.
 
-    :ivar vertices: (., 3) float64, model frame; `vertex_start` (N + 1,) int64.
-    :ivar faces: (., 3) int32 into the vertices of their own model; `face_start` (N + 1,) int64.
-    :ivar closed: (N,) bool, whether faces turned away from the camera need no drawing.
+    :ivar vertices: (., 3) float64, model frame; `vertex_start` (S + 1,) int64.
+    :ivar faces: (., 3) int32 into the vertices of their own model; `face_start` (S + 1,) int64.
+    :ivar closed: (S,) bool, whether faces turned away from the camera need no drawing.
     """
 
     vertices: Float64Array
@@ -104,12 +104,13 @@ class Hypotheses(NamedTuple):
     Hypotheses to be compared, each by itself.
 
     :ivar rows: (m, 10) float64, see core/kernels/pose.py.
-    :ivar category: (m,) int64 class ids.
+    :ivar shape: (m,) int64 numbers of their meshes; `category` (m,) int64 class ids.
     :ivar me: (m,) int64, the number of each in the context, where it is looked through; -1 = it
         is not in there.
     """
 
     rows: Float64Array
+    shape: Int64Array
     category: Int64Array
     me: Int64Array
 

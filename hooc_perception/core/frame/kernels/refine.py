@@ -33,9 +33,10 @@ SHORTEN = 0.93
 
 
 @nb.njit(cache=True)
-def _refine_one(seed: int, h: Float64Array, category: int, me: int, target: Target,
+def _refine_one(seed: int, hypotheses: Hypotheses, k: int, target: Target,
                 settings: RefineSettings) -> float:
-    """Refine hypothesis `h` (10,) in place; see refine_all."""
+    """Refine row k of `hypotheses` in place; see refine_all."""
+    h = hypotheses.rows[k]
     np.random.seed(seed)
     prior, tolerance = settings.size_prior, target.weights.tolerance_m
     sizes = StepSizes(settings.translation, settings.rotation, settings.log_scale)
@@ -53,7 +54,7 @@ def _refine_one(seed: int, h: Float64Array, category: int, me: int, target: Targ
             fresh = False
         elif i > 0:
             random_step(sizes, length, 1.0, q, trial)
-        compare_one(trial, category, me, target, stats, there, -1, nowhere)
+        compare_one(hypotheses, k, trial, target, stats, there, -1, nowhere)
         cost = stats[DELTA] + stats[SHOWN] * (
             settings.complexity + prior * squared_log_scale(trial))
         success = cost < best
@@ -84,6 +85,5 @@ def refine_all(seeds: Int64Array, hypotheses: Hypotheses, views: Views, meshes: 
     reached = np.zeros(m)
     for k in nb.prange(m):
         target = Target(views, meshes, context, weights)
-        reached[k] = _refine_one(seeds[k], hypotheses.rows[k], hypotheses.category[k],
-                                 hypotheses.me[k], target, settings)
+        reached[k] = _refine_one(seeds[k], hypotheses, k, target, settings)
     return reached

@@ -224,7 +224,7 @@ def sample_all(seeds: Int64Array, tables: ModelTables, scene: Surface, scene_cdf
                field: Field, quick: Int8Array, weights: ScoreWeights, settings: DrawSettings,
                ) -> Float64Array:
     """
-    Run `sample` for each of N models.
+    Run `sample` for each of N meshes.
 
     :param seeds: (N,) int64; scene_cdf (N, n) float64 cumulative weights of the scene points.
     :param quick: (X, Y, Z) int8 from quick_field.

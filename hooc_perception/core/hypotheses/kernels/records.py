@@ -9,7 +9,7 @@ from hooc_perception.core.arrays import Float64Array
 
 class ModelTables(NamedTuple):
     """
-    What hypotheses are drawn and scored with, for N models; class id c is row c - 1.
+    What hypotheses are drawn and scored with, for the N meshes of a Shapes.
 
     :ivar points: (N, P, 3) float64 surface points, model frame; `normals` likewise, unit.
     :ivar rest: (N, R, 4) float64 resting rotations, quaternions xyzw, padded.
@@ -47,7 +47,7 @@ class DrawSettings(NamedTuple):
     """
     How hypotheses are drawn.
 
-    :ivar samples: hypotheses drawn per model; `keep` of them are returned at most.
+    :ivar samples: hypotheses drawn per mesh; `keep` of them are returned at most.
     :ivar size_sigma: standard deviation of the log scale.
     :ivar tilted: share of hypotheses in any rotation instead of a resting one.
     :ivar first_points: model points of the quick test; `points` of the score.

@@ -14,13 +14,13 @@ class Shapes:
     The members of the families of some categories, one after the other.
 
     :ivar models: the S meshes.
-    :ivar category: (S,) int64 class id of each, 1..N; `member` (S,) uint16 its place in the family.
+    :ivar category: (S,) int64 class ids, 1..N; `member` (S,) uint16 their places in the families.
     :ivar extents: (S, 3) float64 sides of their bounding boxes, metres.
     :ivar family: (S,) int64 number of members of its family.
     """
 
     def __init__(self, models: Sequence[GenericModel]) -> None:
-        """Number the members of `models`; class id c is models[c - 1]."""
+        """Give each member of the families a number; class id c is models[c - 1]."""
         count = np.array([len(m.members) for m in models], np.int64)
         self.models: tuple[GenericModel, ...] = tuple(s for m in models for s in m.members)
         self.category: Int64Array = np.repeat(np.arange(1, len(models) + 1), count)

@@ -17,8 +17,9 @@ from dataclasses import dataclass
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.types import GenericModel
-from hooc_perception.objects.catalogue import family_name, TRAINING, variant
+from hooc_perception.objects.catalogue import family_name, TRAINING
 from hooc_perception.objects.derive import derive
+from hooc_perception.objects.family import family_meshes
 from hooc_perception.objects.repair import closed
 from hooc_perception.synthesis.convex import convex_pieces
 from hooc_perception.synthesis.reshape import reshape
@@ -32,8 +33,6 @@ FOLDS = 3
 DRAWS = 2
 # Copies of a mesh without a family, and how strongly they are reshaped.
 COPIES, COPY_STRENGTH = 6, 1.5
-# A set's own mesh tells how large its objects are: a family that differs by more is scaled.
-SIZE_LIMIT = 2.0
 # Few samples are enough: nobody draws from them.
 SURFACE_POINTS, INTERIOR_POINTS = 64, 16
 
@@ -83,11 +82,7 @@ def _relative(model: GenericModel, style: int, fold: int, rng: np.random.Generat
         moved = reshape(model.vertices, model.faces, rng, COPY_STRENGTH, model.symmetry)[0]
         mesh = trimesh.Trimesh(moved, model.faces, process=False)
     else:
-        family = family_name(model.name)
-        mesh = variant(family, style, rng)
-        ratio = model.longest_side / float(variant(family).extents.max())
-        if not 1 / SIZE_LIMIT < ratio < SIZE_LIMIT:
-            mesh.apply_scale(ratio)
+        mesh = family_meshes(model, (style,), (rng,))[0]
     shape = derive(model.name, mesh, rng, SURFACE_POINTS, INTERIOR_POINTS)
     solid = closed(trimesh.Trimesh(shape.vertices, shape.faces, process=False))
     return Relative(shape, convex_pieces(solid), fold)

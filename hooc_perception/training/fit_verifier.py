@@ -112,7 +112,8 @@ def verifier_table(context: TrainingContext, config: VerifierConfig,
     scenes = _Scenes(
         tuple(Parser(context.models, unaware_of(context.classifier, fold, 'forest_'),
                      profile(context.profile), limit) for fold in range(FOLDS)),
-        context.population, context.cameras, config, scene_config(fused, min(limit, 4) or 3), context.seed)
+        context.population, context.cameras, config, scene_config(fused, min(limit, 4) or 3),
+        context.seed)
     parts = []
     with Parallel(n_jobs=context.jobs, return_as='generator') as parallel:
         for part in parallel(delayed(_Scenes.parsed)(scenes, k)

@@ -75,7 +75,8 @@ class FusedTable:
     Quantised features of labelled pixels.
 
     :ivar binned: (F, n) uint8; `cuts` (F, bins - 1) float32; `y` (n,) uint8 classes; `fold` (n,)
-        int8 of the shapes (synthesis/population.py); `scene` (n,) int32; `probes` (P, 5) as in `core.classification.features.draw_probes`.
+        int8 of the shapes (synthesis/population.py); `scene` (n,) int32; `probes` (P, 5) as in
+        `core.classification.features.draw_probes`.
     """
 
     binned: UInt8Array

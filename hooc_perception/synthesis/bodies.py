@@ -62,7 +62,8 @@ class BodyMaker:
         return self._pieces[index]
 
     def body(self, category: int, rng: np.random.Generator, strength: float = 0.0,
-             symmetry: bool = True, fold: int | None = None) -> Body:
+             symmetry: bool = True, fold: int | None = None,
+             generic_share: float = GENERIC_SHARE) -> Body:
         """
         Return a Body of class id `category`, reshaped by `strength`.
 
@@ -70,8 +71,9 @@ class BodyMaker:
 
         :param symmetry: whether the model's symmetry is kept.
         :param fold: only relatives of this fold, where there are any.
+        :param generic_share: how often the generic model is taken although there are relatives.
         """
-        relative = self._relative(category, rng, fold)
+        relative = self._relative(category, rng, fold, generic_share)
         if relative is None:
             model, pieces, own = self.models[category - 1], self.pieces(category - 1), -1
         else:
@@ -84,12 +86,12 @@ class BodyMaker:
                     model.rest_rotations, own)
 
     def _relative(self, category: int, rng: np.random.Generator,
-                  fold: int | None) -> Relative | None:
+                  fold: int | None, generic_share: float) -> Relative | None:
         """Return a random relative of a category, None for the generic model itself."""
         relatives = self.population[category - 1] if self.population else ()
         if fold is not None:
             relatives = tuple(r for r in relatives if r.fold == fold)
-        elif relatives and rng.random() < GENERIC_SHARE:
+        elif relatives and rng.random() < generic_share:
             return None
         return relatives[rng.integers(len(relatives))] if relatives else None
 

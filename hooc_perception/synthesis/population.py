@@ -11,7 +11,7 @@ classifier sees all folds but one, so that a scene with the members of that one 
 the tree does on shapes that it has never seen.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from hooc_perception.core.arrays import Float64Array
@@ -56,14 +56,19 @@ class Relative:
 Population = tuple[tuple[Relative, ...], ...]
 
 
-def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1) -> Population:
-    """Return the Population of the models; the same seed gives the same one for any `jobs`."""
+def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
+                 styles: Mapping[str, Sequence[int]] = TRAINING) -> Population:
+    """
+    Return the Population of the models; the same seed gives the same one for any `jobs`.
+
+    :param styles: of each family of the catalogue, those that take part.
+    """
     wanted = []
     for index, model in enumerate(models):
         family = family_name(model.name)
         if family:
             wanted += [(index, style, n % FOLDS, draw)
-                       for n, style in enumerate(TRAINING[family]) for draw in range(DRAWS)]
+                       for n, style in enumerate(styles[family]) for draw in range(DRAWS)]
         else:
             wanted += [(index, -1, copy % FOLDS, copy) for copy in range(COPIES)]
     made = Parallel(n_jobs=jobs)(

@@ -6,7 +6,7 @@ A synthetic twin of the HOOC data set, made from the built-in catalogue.
 It follows section 5 of the paper: 25 categories, one object per category in a scene, 5 scenes
 of 10 and 4 of 20 objects that stand close together and on one another, three Kinect v2 around
 the table with lens distortion and small calibration errors, real objects that differ from their
-generic models, and a jug and a glass whose depth error differs in every view. What the paper
+generic models (they are made from styles of the catalogue that training never sees), and a jug and a glass whose depth error differs in every view. What the paper
 does not state (sizes of table and room, heights of the cameras) is set to values that are
 plausible for a laboratory.
 """
@@ -21,10 +21,11 @@ from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes.scene import TrueObject
 from hooc_perception.io.scenes.writer import NewScene, write_scene_set
-from hooc_perception.objects.catalogue import CATALOGUE
+from hooc_perception.objects.catalogue import CATALOGUE, HELD_OUT
 from hooc_perception.objects.derive import derive
 from hooc_perception.synthesis.bodies import body_maker, BodyMaker
 from hooc_perception.synthesis.pile import SettleConfig
+from hooc_perception.synthesis.population import Population, relatives_of
 from hooc_perception.synthesis.raw_views import Caster
 from hooc_perception.synthesis.rigs import ring, RingShape
 from hooc_perception.synthesis.room import draw_room, Room, RoomConfig
@@ -58,13 +59,16 @@ class TwinOptions:
     :ivar scenes: names from SCENES, () = all.
     :ivar cameras: number of cameras around the table.
     :ivar repeat: whether a scene may have several objects of one category.
-    :ivar strength: deviation of objects from their generic models; 1 = as real ones.
+    :ivar strength: how much objects are bent and stretched; 1 = as real ones from one mesh.
+    :ivar families: whether objects are made from other styles of the catalogue than training ever
+        sees, instead of from the generic models themselves.
     """
 
     scenes: tuple[str, ...] = ()
     cameras: int = 3
     repeat: bool = False
-    strength: float = 1.0
+    strength: float = 0.7
+    families: bool = True
 
     def __post_init__(self) -> None:
         """Raise HoocError, naming the option, if a value is out of range."""
@@ -91,6 +95,7 @@ def write_twin(out_dir: str | Path, seed: int = 0, options: TwinOptions = TwinOp
     meshes = {name: build() for name, build in CATALOGUE.items()}
     models = [derive(name, mesh, stage_rng(seed, 'twin/model', i), surface_points=64,
                      interior_points=16) for i, (name, mesh) in enumerate(meshes.items())]
+    relatives = relatives_of(models, seed, jobs, HELD_OUT) if options.families else ()
     rng = stage_rng(seed, 'twin/rig', options.cameras)
     true_cameras = kinect_rig(rng, options.cameras)
     cameras = tuple(miscalibrated(c, rng, CALIBRATION_RAD, CALIBRATION_M) for c in true_cameras)
@@ -100,7 +105,7 @@ def write_twin(out_dir: str | Path, seed: int = 0, options: TwinOptions = TwinOp
     def scenes() -> Iterator[NewScene]:
         parallel = joblib.Parallel(n_jobs=jobs, return_as='generator')
         done: Any = parallel(joblib.delayed(_scene)(
-            name, SCENES[name], tuple(models), true_cameras, room,
+            name, SCENES[name], tuple(models), relatives, true_cameras, room,
             stage_rng(seed, 'twin/scene', list(SCENES).index(name)), options) for name in names)
         yield from tqdm(done, total=len(names), disable=not progress, unit='scene', desc='twin')
 
@@ -122,10 +127,10 @@ def kinect_rig(rng: np.random.Generator, count: int = 3) -> tuple[Camera, ...]:
     return tuple(cameras)
 
 
-def _scene(name: str, count: int, models: Sequence[GenericModel], cameras: Sequence[Camera],
-           room: Room, rng: np.random.Generator, options: TwinOptions) -> NewScene:
+def _scene(name: str, count: int, models: Sequence[GenericModel], relatives: Population,
+           cameras: Sequence[Camera], room: Room, rng: np.random.Generator, options: TwinOptions) -> NewScene:
     """Return the NewScene of one name, with `count` objects."""
-    maker = body_maker(models)
+    maker = body_maker(models, relatives)
     placed, caster, visible = _arrangement(name, count, maker, cameras, room, rng, options)
     solids = [(o.vertices_world, o.faces) for o in placed]
     names = [maker.models[o.category - 1].name for o in placed]
@@ -148,7 +153,7 @@ def _arrangement(name: str, count: int, maker: BodyMaker, cameras: Sequence[Came
     """Return (objects, their Caster, visible shares) of a pile that keeps all its objects."""
     for _ in range(TRIES):
         classes = rng.choice(len(maker.models), count, replace=options.repeat) + 1
-        bodies = [maker.body(int(c), rng, options.strength) for c in classes]
+        bodies = [maker.body(int(c), rng, options.strength, generic_share=0.0) for c in classes]
         placed = settle(bodies, rng, PLACEMENT)
         if len(placed) < count:
             continue

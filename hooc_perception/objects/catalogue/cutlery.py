@@ -82,5 +82,3 @@ def spatula() -> Manifold:
 
 
 BUILDERS = {'fork': fork, 'knife': knife, 'spoon': spoon, 'spatula': spatula}
-
-STYLES = {name: (lambda draw, build=build: build(),) for name, build in BUILDERS.items()}

@@ -72,5 +72,3 @@ def dustpan() -> Manifold:
 
 
 BUILDERS = {'plate': plate, 'tray': tray, 'frying_pan': frying_pan, 'dustpan': dustpan}
-
-STYLES = {name: (lambda draw, build=build: build(),) for name, build in BUILDERS.items()}

@@ -60,5 +60,3 @@ def tube() -> Manifold:
 
 BUILDERS = {'stapler': stapler, 'book': book, 'box': carton, 'sellotape_core': sellotape_core,
             'tube': tube}
-
-STYLES = {name: (lambda draw, build=build: build(),) for name, build in BUILDERS.items()}

@@ -35,5 +35,3 @@ def can() -> Manifold:
 
 
 BUILDERS = {'ball': ball, 'banana': banana, 'can': can}
-
-STYLES = {name: (lambda draw, build=build: build(),) for name, build in BUILDERS.items()}

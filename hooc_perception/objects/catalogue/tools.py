@@ -84,5 +84,3 @@ def scissors() -> Manifold:
 
 
 BUILDERS = {'hammer': hammer, 'screwdriver': screwdriver, 'drill': drill, 'scissors': scissors}
-
-STYLES = {name: (lambda draw, build=build: build(),) for name, build in BUILDERS.items()}

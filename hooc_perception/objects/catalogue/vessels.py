@@ -62,5 +62,3 @@ def bowl() -> Manifold:
 
 
 BUILDERS = {'teacup': teacup, 'glass': glass, 'jug': jug, 'bottle': bottle, 'bowl': bowl}
-
-STYLES = {name: (lambda draw, build=build: build(),) for name, build in BUILDERS.items()}

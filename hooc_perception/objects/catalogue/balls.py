@@ -29,12 +29,6 @@ def _relief(radius: float, height_at: Callable[[Float64Array], Float64Array],
     return Manifold.sphere(1.0, segments).warp_batch(lift)
 
 
-def _turned(draw: Draw, solid: Manifold) -> Manifold:
-    """Return a solid turned at random, as a ball lies anyhow."""
-    return solid.rotate((draw.between(-180, 180), draw.between(-180, 180),
-                         draw.between(-180, 180)))
-
-
 def _even(count: int) -> Float64Array:
     """Return (count, 3) directions spread evenly over the sphere."""
     z = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
@@ -60,7 +54,7 @@ def seamed_ball(draw: Draw) -> Manifold:
 
     def height_at(unit: Float64Array) -> Float64Array:
         return np.asarray(height * np.exp(-(_nearest(unit, seam)[:, 0] / width) ** 2))
-    return _turned(draw, _relief(draw.about(0.035), height_at))
+    return _relief(draw.about(0.035), height_at)
 
 
 def panelled_ball(draw: Draw) -> Manifold:
@@ -79,7 +73,7 @@ def panelled_ball(draw: Draw) -> Manifold:
     def height_at(unit: Float64Array) -> Float64Array:
         near = _nearest(unit, marks)
         return np.asarray(-depth * np.exp(-((near[:, 1] - near[:, 0]) / 0.13) ** 2))
-    return _turned(draw, _relief(draw.about(0.055, 0.2), height_at))
+    return _relief(draw.about(0.055, 0.2), height_at)
 
 
 def channelled_ball(draw: Draw) -> Manifold:
@@ -93,7 +87,7 @@ def channelled_ball(draw: Draw) -> Manifold:
     def height_at(unit: Float64Array) -> Float64Array:
         off = np.abs(unit @ normals.T).min(axis=1)
         return np.asarray(-depth * np.exp(-(off / width) ** 2))
-    return _turned(draw, _relief(draw.about(0.054, 0.2), height_at))
+    return _relief(draw.about(0.054, 0.2), height_at)
 
 
 def dimpled_ball(draw: Draw) -> Manifold:
@@ -103,17 +97,17 @@ def dimpled_ball(draw: Draw) -> Manifold:
 
     def height_at(unit: Float64Array) -> Float64Array:
         return np.asarray(-depth * np.exp(-(_nearest(unit, marks)[:, 0] / width) ** 2))
-    return _turned(draw, _relief(draw.about(0.025, 0.2), height_at))
+    return _relief(draw.about(0.025, 0.2), height_at)
 
 
 def knobbly_ball(draw: Draw) -> Manifold:
     """Return a ball with knobs or blunt spikes: for massage, dogs or the dryer."""
-    marks = _even(draw.pick(32, 22, 46))
+    marks = _even(draw.pick(32, 22, 14))
     height, width = draw.about(0.16, 0.4), 0.95 / np.sqrt(len(marks))
 
     def height_at(unit: Float64Array) -> Float64Array:
         return np.asarray(height * np.exp(-(_nearest(unit, marks)[:, 0] / width) ** 2))
-    return _turned(draw, _relief(draw.about(0.036, 0.2), height_at))
+    return _relief(draw.about(0.036, 0.2), height_at)
 
 
 def oval_ball(draw: Draw) -> Manifold:
@@ -130,7 +124,7 @@ def oval_ball(draw: Draw) -> Manifold:
 
 def faceted_ball(draw: Draw) -> Manifold:
     """Return a ball with few flat faces, as of a coarse model or a many-sided die."""
-    return _turned(draw, Manifold.sphere(draw.about(0.031, 0.25), draw.pick(12, 8, 16)))
+    return Manifold.sphere(draw.about(0.031, 0.25), draw.pick(12, 8, 16))
 
 
 def squashed_ball(draw: Draw) -> Manifold:
@@ -147,12 +141,12 @@ def holed_ball(draw: Draw) -> Manifold:
     marks = _even(draw.pick(12, 8, 3, 18))
     if len(marks) == 3:
         marks = np.array([(0.25, 0.15, 1.0), (-0.25, 0.15, 1.0), (0.0, -0.35, 1.0)])
-    solid = Manifold.sphere(r, 32)
+    solid = Manifold.sphere(r, 28)
     for x, y, z in marks / np.linalg.norm(marks, axis=1, keepdims=True):
         drill = cylinder(hole, r, at=(0.0, 0.0, (1.0 - depth) * r), segments=12)
         tilt, turn = np.degrees(np.arccos(z)), np.degrees(np.arctan2(y, x))
         solid -= drill.rotate((0.0, tilt, 0.0)).rotate((0.0, 0.0, turn))
-    return _turned(draw, solid)
+    return solid
 
 
 def ribbed_ball(draw: Draw) -> Manifold:
@@ -173,7 +167,7 @@ def knotted_ball(draw: Draw) -> Manifold:
     solid = Manifold.sphere(r, 40)
     neck = cylinder(cap * r, draw.between(0.12, 0.45) * r, at=(0.0, 0.0, 0.9 * r), segments=16,
                     top=cap * r * draw.between(0.6, 1.2))
-    return (solid + neck).rotate((draw.pick(0.0, 70.0, 110.0), 0.0, 0.0))
+    return solid + neck
 
 
 STYLES = {'ball': (ball, seamed_ball, panelled_ball, channelled_ball, dimpled_ball, knobbly_ball,

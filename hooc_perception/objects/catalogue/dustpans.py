@@ -93,12 +93,11 @@ def steel_pan(draw: Draw) -> Manifold:
 def hooded_pan(draw: Draw) -> Manifold:
     """Return a scoop whose back half is covered by a hood that leads to a thick handle."""
     length, width, height = draw.about(0.230), draw.about(0.210), draw.about(0.060, 0.2)
-    back = width * draw.between(0.55, 0.9)
-    shell, inside = _scoop(length, width, back, height, 0.05, 0.03)
-    x, cover = length / 2, draw.between(0.25, 0.45) * length
-    hood = (shell + inside).trim_by_plane((1.0, 0.0, 0.0), x - cover)
-    hood = hood.trim_by_plane((0.0, 0.0, -1.0), -height).trim_by_plane(
-        (0.0, 0.0, 1.0), height - 0.005)
+    back, cover = width * draw.between(0.55, 0.9), draw.between(0.25, 0.45) * length
+    shell, inside = _scoop(length, width, back, height, cover, 0.03)
+    x = length / 2
+    hood = rounded_box(cover, back, 0.005, min(0.03, 0.4 * cover),
+                       at=(0.5 * (length - cover), 0.0, height - 0.005))
     reach = draw.about(0.150, 0.2)
     handle = rod([(x - 0.02, 0.6 * height), (x + 0.3 * reach, 0.75 * height),
                   (x + reach, draw.between(0.5, 1.0) * height)],

@@ -83,7 +83,7 @@ def creamer(draw: Draw) -> Manifold:
     r, h = draw.about(0.038), draw.about(0.080)
     side = np.vstack([[(0.62 * r, 0.0)], curve([
         (0.65 * r, 0.003), (r, 0.38 * h), (r * draw.between(0.66, 0.85), 0.8 * h),
-        (r * draw.between(0.78, 0.95), h)], 9)])
+        (r * draw.between(0.78, 0.95), h)], 8)])
     spout, open_spout = lip(side, draw.about(0.020, 0.12), 0.003)
     inside = cavity(side, draw.about(0.0035, 0.15), level(draw, 0.006, h)) + open_spout
     handle = loop(side, 0.9 * h, 0.35 * h, draw.about(0.026, 0.2), draw.about(0.0035, 0.2),
@@ -96,7 +96,7 @@ def carafe(draw: Draw) -> Manifold:
     r, h, neck = draw.about(0.055), draw.about(0.230, 0.12), draw.between(0.40, 0.6)
     side = np.vstack([[(0.8 * r, 0.0)], curve([
         (0.85 * r, 0.004), (r, 0.22 * h), (0.8 * r, 0.48 * h), (neck * r, 0.74 * h),
-        (neck * r * draw.between(1.15, 1.5), h)], 11)])
+        (neck * r * draw.between(1.15, 1.5), h)], 9)])
     inside = cavity(side, draw.about(0.003, 0.2), level(draw, 0.007, h))
     if draw.chance(0.5):
         spout, open_spout = lip(side, 0.016, 0.003)
@@ -131,7 +131,7 @@ def ewer(draw: Draw) -> Manifold:
     r, h = draw.about(0.050), draw.about(0.215)
     side = np.vstack([[(0.66 * r, 0.0), (0.64 * r, 0.006)], curve([
         (0.62 * r, 0.008), (r, 0.36 * h), (0.78 * r, 0.58 * h),
-        (r * draw.between(0.38, 0.5), 0.78 * h), (r * draw.between(0.55, 0.75), h)], 11)])
+        (r * draw.between(0.38, 0.5), 0.78 * h), (r * draw.between(0.55, 0.75), h)], 9)])
     spout, open_spout = lip(side, draw.about(0.022, 0.12), 0.003)
     inside = cavity(side, 0.0035, level(draw, 0.010, h)) + open_spout
     handle = loop(side, 0.93 * h, h * draw.between(0.4, 0.55), draw.about(0.032, 0.2),

@@ -72,7 +72,7 @@ def _handle(draw: Draw, at: tuple[float, float], length: float, lift: float, bow
 def _side(r: float, h: float, foot: float, belly: float = 0.0) -> Float64Array:
     """Return the side line of a pan: of a foot, a rim radius, and a bellied or straight wall."""
     middle = (0.5 * (foot + r) + belly * r, 0.42 * h)
-    return np.vstack([[(foot - 0.004, 0.0)], curve([(foot, 0.003), middle, (r, h)], 6)])
+    return np.vstack([[(foot - 0.004, 0.0)], curve([(foot, 0.003), middle, (r, h)], 5)])
 
 
 def _grip(side: npt.ArrayLike, z: float, half: float, reach: float) -> Manifold:
@@ -86,8 +86,8 @@ def _grip(side: npt.ArrayLike, z: float, half: float, reach: float) -> Manifold:
 def _pan(side: npt.ArrayLike, wall: float, floor: float, handles: Manifold,
          shape: npt.ArrayLike | None = None) -> Manifold:
     """Return a pan of a side line with handles."""
-    inside = cavity(side, wall, floor, shape, 40)
-    return body(side, shape, 40) - inside + (handles - inside)
+    inside = cavity(side, wall, floor, shape, 32)
+    return body(side, shape, 32) - inside + (handles - inside)
 
 
 def saute_pan(draw: Draw) -> Manifold:
@@ -122,7 +122,7 @@ def skillet(draw: Draw) -> Manifold:
     solid = _pan(side, wall, level(draw, 0.006, h), handle)
     if draw.chance(0.7):
         outer, inner = lip(side, 0.020, 0.003)
-        inside = cavity(side, wall, 0.006, None, 40) + inner.rotate((0, 0, 90)) + inner.rotate(
+        inside = cavity(side, wall, 0.006, None, 32) + inner.rotate((0, 0, 90)) + inner.rotate(
             (0, 0, -90))
         solid = solid + outer.rotate((0, 0, 90)) + outer.rotate((0, 0, -90)) - inside
     return solid
@@ -168,7 +168,7 @@ def square_pan(draw: Draw) -> Manifold:
     """Return a square grill pan with ribs, or an oblong omelette pan."""
     r, h = draw.about(0.120, 0.14), draw.about(0.038, 0.25)
     aspect = draw.between(0.65, 1.0)
-    shape = superellipse(aspect, draw.between(4.5, 8.0), 40)
+    shape = superellipse(aspect, draw.between(4.5, 8.0), 36)
     side = _side(r, h, r * draw.between(0.88, 0.95))
     handle = _handle(draw, (r - 0.008, 0.75 * h), draw.about(0.170), draw.between(0.0, 0.05),
                      0.004, [0.012, 0.009, 0.012, 0.011], [0.006, 0.006, 0.008, 0.007])
@@ -185,11 +185,11 @@ def lidded_pan(draw: Draw) -> Manifold:
     side = _side(r, h, r * draw.between(0.82, 0.95), 0.02)
     handle = _handle(draw, (r - 0.010, 0.75 * h), draw.about(0.185), draw.between(0.0, 0.05),
                      0.004, [0.009, 0.009, 0.013, 0.011], 0.007)
-    solid = body(side, None, 40) + handle
+    solid = body(side, None, 32) + handle
     if draw.chance(0.6):
         rise = draw.about(0.018, 0.3)
         solid += body([(r + 0.002, h - 0.003), (r + 0.002, h), (0.7 * r, h + 0.65 * rise),
-                       (0.02, h + rise)], None, 40)
+                       (0.02, h + rise)], None, 32)
         solid += body([(0.008, h + rise - 0.002), (0.008, h + rise + 0.010),
                        (0.017, h + rise + 0.016), (0.014, h + rise + 0.026)], None, 16)
     return solid
@@ -224,8 +224,8 @@ def paella_pan(draw: Draw) -> Manifold:
     r, h = draw.about(0.145, 0.2), draw.about(0.042, 0.25)
     side = _side(r, h, r * draw.between(0.78, 0.94))
     wall = draw.about(0.004, 0.25)
-    inside = cavity(side, wall, level(draw, 0.004, h), None, 40)
-    solid = body(side, None, 40) - inside
+    inside = cavity(side, wall, level(draw, 0.004, h), None, 32)
+    solid = body(side, None, 32) - inside
     if draw.chance(0.75):
         grip = _grip(side, h - 0.010, draw.about(0.045, 0.2), draw.about(0.032, 0.25)) - inside
         return solid + grip + grip.rotate((0.0, 0.0, 180.0))

@@ -7,7 +7,7 @@ from hooc_perception.objects.catalogue.shapes import box, cylinder, lathe
 from manifold3d import Manifold
 import numpy as np
 
-FINE = 48
+FINE = 40
 
 
 def sellotape_core(draw: Draw) -> Manifold:

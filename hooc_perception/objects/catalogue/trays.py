@@ -78,7 +78,7 @@ def round_tray(draw: Draw) -> Manifold:
 
 def oval_tray(draw: Draw) -> Manifold:
     """Return an oval tray with grips that stand out from its rim, or holes in it."""
-    r, h = draw.about(0.200), draw.about(0.032, 0.3)
+    r, h = draw.about(0.185), draw.about(0.032, 0.3)
     shape = superellipse(draw.between(0.6, 0.75), draw.between(2.0, 3.2), FINE)
     side = [(r * draw.between(0.82, 0.95), 0.0), (0.985 * r, 0.8 * h), (r, h)]
     inside = cavity(side, draw.about(0.005, 0.3), draw.about(0.004, 0.2), shape)

@@ -107,7 +107,8 @@ def palette_knife(draw: Draw) -> Manifold:
                   (-length + 0.006, 0.75 * width, 0.001, 0.001)], 5)
     grip = draw.about(0.0115, 0.2)
     haft = bar([(-length - 0.145, 0.6 * grip, 0.5 * grip, step),
-                (-length - 0.14, grip, 0.85 * grip, step), (-length - 0.08, 1.1 * grip, 0.9 * grip, step),
+                (-length - 0.14, grip, 0.85 * grip, step),
+                (-length - 0.08, 1.1 * grip, 0.9 * grip, step),
                 (-length - 0.025, 0.7 * grip, 0.6 * grip, step)], 8)
     return resized(sheet + neck + haft, draw)
 

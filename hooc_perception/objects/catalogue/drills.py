@@ -112,7 +112,7 @@ def stick_battery_drill(draw: Draw) -> Manifold:
 
 
 def impact_driver(draw: Draw) -> Manifold:
-    """Return an impact driver: a stubby cone as nose, a thin collet, a hexagonal bit."""
+    """Return an impact driver: a stubby cone as nose, a thin socket, a hexagonal bit."""
     z, r = draw.about(0.160, 0.1), draw.about(0.031)
     body = _barrel([(-0.068, 0.85 * r), (-0.062, r), (0.0, r), (0.012, 0.95 * r),
                     (0.050, 0.5 * r), (0.055, 0.3 * r), (0.068, 0.28 * r)], z, 1.05)

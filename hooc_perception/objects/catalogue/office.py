@@ -2,6 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Stapler, book, box, sellotape core and tube."""
 
+from collections.abc import Callable
+from functools import partial
+
+from hooc_perception.objects.catalogue.books import BOOKS
+from hooc_perception.objects.catalogue.boxes import BOXES
+from hooc_perception.objects.catalogue.draw import Draw
+from hooc_perception.objects.catalogue.hafts import resized
 from hooc_perception.objects.catalogue.shapes import (
     box,
     curve,
@@ -10,11 +17,13 @@ from hooc_perception.objects.catalogue.shapes import (
     rounded_box,
     union,
 )
+from hooc_perception.objects.catalogue.staplers import STAPLERS
+from hooc_perception.objects.catalogue.tubes import TUBES
 from manifold3d import Manifold
 import numpy as np
 
 
-def stapler() -> Manifold:
+def stapler(draw: Draw) -> Manifold:
     """Return a desk stapler, its arm raised a little over the base."""
     base = (rounded_box(0.150, 0.036, 0.008, 0.010)
             + rounded_box(0.040, 0.030, 0.026, 0.006, at=(-0.052, 0.0, 0.0)))
@@ -23,27 +32,29 @@ def stapler() -> Manifold:
                                9)])
     arm = outline(profile).extrude(0.032).rotate((90.0, 0.0, 0.0)).translate((0.0, 0.016, 0.0))
     magazine = box(0.136, 0.018, 0.014, at=(0.003, 0.0, -0.011))
-    arm = (arm + magazine).rotate((0.0, -7.0, 0.0)).translate((0.0, 0.0, 0.033))
+    arm = (arm + magazine).rotate((0.0, -draw.between(2.0, 12.0), 0.0))
+    arm = arm.translate((0.0, 0.0, 0.033))
     anvil = rounded_box(0.022, 0.016, 0.002, 0.004, at=(0.058, 0.0, 0.008))
-    return union(base, arm, anvil)
+    return resized(union(base, arm, anvil), draw)
 
 
-def book() -> Manifold:
+def book(draw: Draw) -> Manifold:
     """Return a hardback that lies flat: two boards, a round spine, pages set back."""
     pages = box(0.140, 0.208, 0.028, at=(0.001, 0.0, 0.003))
     board = box(0.150, 0.220, 0.003)
     round_back = cylinder(0.017, 0.220, at=(0.0, -0.110, 0.0), axis='y', segments=24)
     spine = (round_back - round_back.scale((0.8, 1.1, 0.8))).scale((0.5, 1.0, 1.0))
     spine = spine.trim_by_plane((-1.0, 0.0, 0.0), 0.0).translate((-0.0745, 0.0, 0.017))
-    return union(pages, board, board.translate((0.0, 0.0, 0.031)), spine)
+    solid = union(pages, board, board.translate((0.0, 0.0, 0.031)), spine)
+    return resized(solid.scale((1.0, 1.0, draw.about(1.0, 0.25))), draw)
 
 
-def carton() -> Manifold:
+def carton(draw: Draw) -> Manifold:
     """Return a carton, such as of cereals, its lid tucked in."""
     body = box(0.150, 0.062, 0.210)
     seam = box(0.146, 0.002, 0.002, at=(0.0, 0.024, 0.2085))
     thumb = cylinder(0.010, 0.002, at=(0.0, 0.024, 0.2085), segments=24)
-    return body - (seam + thumb)
+    return resized(body - (seam + thumb), draw, 0.12)
 
 
 def sellotape_core() -> Manifold:
@@ -52,11 +63,16 @@ def sellotape_core() -> Manifold:
     return outer - cylinder(0.0385, 0.03, at=(0.0, 0.0, -0.003), segments=48)
 
 
-def tube() -> Manifold:
+def tube(draw: Draw) -> Manifold:
     """Return a cardboard tube, open at both ends, lying down."""
     outer = cylinder(0.022, 0.240, at=(0.0, -0.120, 0.022), axis='y', segments=48)
-    return outer - cylinder(0.0195, 0.250, at=(0.0, -0.125, 0.022), axis='y', segments=48)
+    bore = 0.022 - 0.0025 * draw.about(1.0, 0.3)
+    solid = outer - cylinder(bore, 0.250, at=(0.0, -0.125, 0.022), axis='y', segments=48)
+    return resized(solid, draw, 0.12)
 
 
-BUILDERS = {'stapler': stapler, 'book': book, 'box': carton, 'sellotape_core': sellotape_core,
-            'tube': tube}
+STYLES: dict[str, tuple[Callable[[Draw], Manifold], ...]] = {
+    'stapler': (stapler, *STAPLERS), 'book': (book, *BOOKS), 'box': (carton, *BOXES),
+    'tube': (tube, *TUBES)}
+BUILDERS = {'sellotape_core': sellotape_core,
+            **{name: partial(styles[0], Draw()) for name, styles in STYLES.items()}}

@@ -2,25 +2,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ball, banana and can."""
 
-from hooc_perception.objects.catalogue.shapes import filled, lathe, sweep
+from functools import partial
+
+from hooc_perception.objects.catalogue.draw import Draw
+from hooc_perception.objects.catalogue.fruit import banana
+from hooc_perception.objects.catalogue.shapes import filled, lathe
 from manifold3d import Manifold
-import numpy as np
 
 
 def ball() -> Manifold:
     """Return a ball."""
     return Manifold.sphere(0.036, 48)
-
-
-def banana() -> Manifold:
-    """Return a banana that lies on its side, with a stalk."""
-    along = np.linspace(0, 1, 24)
-    angle = np.radians(-52 + 104 * along)
-    bend = 0.105
-    path = np.column_stack([bend * np.sin(angle), bend * np.cos(angle) - bend, 0 * angle])
-    girth = np.interp(along, [0, 0.05, 0.10, 0.22, 0.5, 0.78, 0.93, 0.97, 1],
-                      [0.0045, 0.0045, 0.006, 0.0155, 0.019, 0.0165, 0.008, 0.0045, 0.004])
-    return sweep(path, girth, girth * 0.95, sides=7)
 
 
 def can() -> Manifold:
@@ -34,4 +26,4 @@ def can() -> Manifold:
         (0.004, 0.0, 0.0))
 
 
-BUILDERS = {'ball': ball, 'banana': banana, 'can': can}
+BUILDERS = {'ball': ball, 'banana': partial(banana, Draw()), 'can': can}

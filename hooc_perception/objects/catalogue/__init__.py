@@ -14,7 +14,17 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from hooc_perception.objects.catalogue import cutlery, kitchen, office, things, tools, vessels
+from hooc_perception.objects.catalogue import (
+    balls,
+    cans,
+    cutlery,
+    fruit,
+    kitchen,
+    office,
+    rings,
+    tools,
+    vessels,
+)
 from hooc_perception.objects.catalogue.draw import Draw
 from hooc_perception.objects.catalogue.write import write_catalogue as _write
 from hooc_perception.objects.manifold import from_manifold
@@ -27,7 +37,7 @@ __all__ = ['CATALOGUE', 'FAMILIES', 'HELD_OUT', 'TRAINING', 'family_name', 'vari
 
 Style = Callable[[Draw], Manifold]
 FAMILIES: dict[str, tuple[Style, ...]] = dict(sorted(
-    item for group in (cutlery, kitchen, office, things, tools, vessels)
+    item for group in (balls, cans, cutlery, fruit, kitchen, office, rings, tools, vessels)
     for item in group.STYLES.items()))
 # Every third style is kept from training.
 TRAINING = {name: tuple(k for k in range(len(styles)) if k % 3 != 2)

@@ -56,7 +56,7 @@ def compact_drill(draw: Draw) -> Manifold:
     """Return a short cordless drill on a small foot, without a bit."""
     z, r = draw.about(0.150, 0.1), draw.about(0.028)
     body = _barrel([(-0.068, 0.75 * r), (-0.060, r), (0.0, 1.02 * r), (0.024, 0.75 * r)], z, 1.1)
-    grip = _grip(-0.024, -0.036, 0.028, z, draw.about(0.019), draw.about(0.0165))
+    grip = _grip(-0.024, -0.036, 0.012, z, draw.about(0.019), draw.about(0.0165))
     foot = rounded_box(draw.about(0.080, 0.2), draw.about(0.052, 0.2), draw.about(0.036, 0.2),
                        0.012, at=(-0.028, 0.0, 0.0))
     trigger = box(0.038, 0.012, 0.026, at=(-0.012, 0.0, z - r - 0.022))
@@ -117,7 +117,7 @@ def impact_driver(draw: Draw) -> Manifold:
     body = _barrel([(-0.068, 0.85 * r), (-0.062, r), (0.0, r), (0.012, 0.95 * r),
                     (0.050, 0.5 * r), (0.055, 0.3 * r), (0.068, 0.28 * r)], z, 1.05)
     bit = cylinder(0.0036, draw.about(0.045, 0.35), at=(0.066, 0.0, z), axis='x', segments=6)
-    grip = _grip(-0.026, -0.042, 0.03, z, draw.about(0.021), draw.about(0.0175))
+    grip = _grip(-0.026, -0.042, 0.02, z, draw.about(0.021), draw.about(0.0175))
     foot = rounded_box(draw.about(0.115), draw.about(0.070), draw.about(0.050, 0.2), 0.008,
                        at=(-0.024, 0.0, 0.0))
     trigger = box(0.038, 0.012, 0.028, at=(-0.012, 0.0, z - r - 0.024))
@@ -141,7 +141,7 @@ def centre_grip_drill(draw: Draw) -> Manifold:
     z, r = draw.about(0.190, 0.1), draw.about(0.0275)
     body = _barrel([(-0.100, 0.85 * r), (-0.095, r), (-0.03, 1.03 * r), (0.04, 0.95 * r),
                     (0.055, 0.8 * r)], z, draw.about(1.1, 0.08))
-    grip = _grip(-0.012, -0.014, 0.05, z, draw.about(0.019), draw.about(0.0165))
+    grip = _grip(-0.012, -0.014, 0.04, z, draw.about(0.019), draw.about(0.0165))
     foot = rounded_box(draw.about(0.085), draw.about(0.075), draw.about(0.070), 0.010,
                        at=(-0.012, 0.0, 0.0))
     trigger = box(0.040, 0.012, 0.03, at=(0.002, 0.0, z - r - 0.03))

@@ -15,8 +15,15 @@ from scipy.interpolate import PchipInterpolator
 _Point = tuple[float, float, float]
 
 
-def resized(solid: Manifold, draw: Draw, spread: float = 0.08) -> Manifold:
-    """Return a solid in a random size, with its axes stretched independently."""
+def resized(solid: Manifold, draw: Draw, spread: float = 0.07) -> Manifold:
+    """
+    Return a solid in a random size, with its axes stretched independently.
+
+    Only its largest part is kept, without closed voids, so that it is one solid for sure.
+    """
+    parts = solid.decompose()
+    if len(parts) > 1:
+        solid = max(parts, key=Manifold.volume)
     size = draw.about(1.0, spread)
     return solid.scale((size * draw.about(1.0, spread), size * draw.about(1.0, spread),
                         size * draw.about(1.0, spread)))

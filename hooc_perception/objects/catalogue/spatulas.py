@@ -83,7 +83,7 @@ def fish_slice(draw: Draw) -> Manifold:
     for y in np.linspace(-0.72, 0.72, rows):
         slot = rounded_rectangle(1.2 * length, 0.9 * width / rows, 0.4 * width / rows, 8)
         blade -= slot.translate((0.12 * length, 0.9 * y * width))
-    rise, end = draw.about(0.040, 0.3), draw.about(0.245)
+    rise, end = draw.about(0.040, 0.3), length + draw.about(0.180)
     sheet = blade.extrude(draw.about(0.0018, 0.3))
     wide = draw.about(0.0085, 0.25)
     neck = brick([(-end + 0.01, wide, 0.0016, rise + 0.03), (-length - 0.03, wide, 0.0014, rise),
@@ -91,7 +91,7 @@ def fish_slice(draw: Draw) -> Manifold:
                   (-0.85 * length, 0.3 * width, 0.0013, 0.0013)], 10)
     haft = bar([(-end - 0.02, wide, 0.5 * wide, rise + 0.032),
                 (-end - 0.01, 1.3 * wide, 0.7 * wide, rise + 0.031),
-                (-length - 0.08, wide, 0.6 * wide, rise + 0.014)], 5)
+                (-length - 0.08, wide, 0.8 * wide, rise + 0.014)], 5)
     return resized(sheet + neck + haft, draw)
 
 

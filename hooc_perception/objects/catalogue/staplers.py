@@ -41,7 +41,7 @@ def _arm(top: npt.ArrayLike, width: float, angle: float, pivot: tuple[float, flo
 
 def mini_stapler(draw: Draw) -> Manifold:
     """Return a pocket stapler: short, high and rounded."""
-    half, width = draw.about(0.031), draw.about(0.021)
+    half, width = draw.about(0.035), draw.about(0.022)
     high, gap = draw.about(0.024, 0.2), draw.about(0.006, 0.4)
     base = rounded_box(2 * half, width, 0.006, 0.3 * width)
     hinge = box(0.022, 0.8 * width, 0.012 + gap, at=(-half + 0.013, 0.0, 0.003))
@@ -53,7 +53,7 @@ def mini_stapler(draw: Draw) -> Manifold:
 
 def heavy_stapler(draw: Draw) -> Manifold:
     """Return a heavy-duty stapler: a long, flat base, a high body and a raised lever."""
-    half, width = draw.about(0.125), draw.about(0.034, 0.2)
+    half, width = draw.about(0.112), draw.about(0.032, 0.2)
     base = rounded_box(2 * half, draw.about(1.9 * width), 0.010, 0.012)
     post = rounded_box(0.8 * half, width, 0.055, 0.008, at=(-0.5 * half, 0.0, 0.0))
     body = slab(outline([(-half, 0.028), (0.85 * half, 0.028), (0.85 * half, 0.070),

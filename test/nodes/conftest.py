@@ -16,6 +16,8 @@ import numpy as np
 import pytest
 import trimesh
 
+TURN_S = 0.02
+
 
 class Bench:
     """An executor with the node under test and a `peer` that talks to it."""
@@ -45,16 +47,19 @@ class Bench:
         self.peer.create_subscription(kind, topic, self.heard[topic].append, profile)
         return self.heard[topic]
 
-    def spin(self, condition, timeout_s=10.0):
+    def spin(self, condition, timeout_s=30.0):
         """Serve callbacks until a condition holds; return whether it came to hold."""
         deadline = time.monotonic() + timeout_s
         while not (value := condition()) and time.monotonic() < deadline:
-            self.executor.spin_once(timeout_sec=0.02)
+            self.executor.spin_once(timeout_sec=TURN_S)
         return value
 
     def rest(self, seconds=0.4):
-        """Serve callbacks for so long."""
-        self.spin(lambda: False, seconds)
+        """Serve callbacks for so long, and as often as an idle machine would do it meanwhile."""
+        turns, start = seconds / TURN_S, time.monotonic()
+        while turns > 0 or time.monotonic() - start < seconds:
+            self.executor.spin_once(timeout_sec=TURN_S)
+            turns -= 1
 
     def reasons(self, node):
         """Return {thing: (reason code, sentence)} of a node's diagnostics."""

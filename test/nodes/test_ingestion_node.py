@@ -76,7 +76,7 @@ def test_best_effort_cameras_are_heard(bench):
     for i in range(20):
         raw.send(i * 10**8 + 1)
         bench.rest(0.05)
-    assert heard['a']
+    assert bench.spin(lambda: heard['a'])
 
 
 def test_extrinsics_from_parameters(bench):
@@ -119,12 +119,14 @@ def test_next_set_waits_for_the_answer(bench):
     for i in range(4):
         raw.send(i * 10**8 + 1)
         bench.rest(0.1)
+    drops = node.work.assembly.sets.drops
+    assert bench.spin(lambda: drops['a', 'superseded'] == 2)
     assert len(heard['a']) == 1
     answers.publish(PoseArray(header=c.header(1, 'table')))
     assert bench.spin(lambda: len(heard['a']) == 2)
     # The newest, not the next in line.
     assert c.nanoseconds(heard['a'][1].header.stamp) == 3 * 10**8 + 1
-    assert node.work.assembly.sets.drops['a', 'superseded'] == 2
+    assert drops['a', 'superseded'] == 2
 
 
 def test_a_refused_set_is_not_waited_for(bench):
@@ -138,6 +140,7 @@ def test_a_refused_set_is_not_waited_for(bench):
     for i in range(2):
         raw.send(i * 10**8 + 1)
         bench.rest(0.1)
+    assert bench.spin(lambda: heard['a'])
     assert len(heard['a']) == 1
     refusals.publish(c.header(77, 'table'))     # of another set
     bench.rest(0.2)

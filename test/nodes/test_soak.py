@@ -3,9 +3,11 @@
 """Days beside a robot, in short: nothing grows, and every frame is used or counted."""
 
 from collections import Counter, deque
+import ctypes
 import gc
 import importlib.util
 from pathlib import Path
+import sys
 
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -18,7 +20,6 @@ from hooc_perception.nodes.ingestion_node import IngestionNode
 from hooc_perception.ros.messages import conversions as c
 from hooc_perception.ros.qos import qos
 from hooc_perception.supervisor import environment
-import psutil  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 
 spec = importlib.util.spec_from_file_location('raw_camera', Path(__file__).with_name(
@@ -26,18 +27,43 @@ spec = importlib.util.spec_from_file_location('raw_camera', Path(__file__).with_
 raw_camera = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(raw_camera)
 
-SETS, STEPS, MS = 2000, 300, 10 ** 6
+SETS, LOOP, STEPS, MS = 1000, 250, 300, 10 ** 6
 
 
-def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
-    """Through the node itself, on a clock of our own: an hour at 0.5 Hz in seconds."""
+class MallInfo(ctypes.Structure):
+    """What mallinfo2(3) of the C library returns."""
+
+    _fields_ = [(name, ctypes.c_size_t) for name in (
+        'arena', 'ordblks', 'smblks', 'hblks', 'hblkhd', 'usmblks', 'fsmblks', 'uordblks',
+        'fordblks', 'keepcost')]
+
+
+def allocated():
+    """
+    Return (bytes that malloc has handed out, number of small objects of Python).
+
+    The resident memory of a process that has run a thousand tests moves by megabytes when the
+    allocator takes or returns pages, and stays where a leak fits into what is free. This does not:
+    arrays and what C++ makes are in the first number, Python's own objects in the second.
+    """
+    gc.collect()
+    measure = getattr(ctypes.CDLL(None), 'mallinfo2', None)
+    if measure is None:      # another C library
+        return 0, sys.getallocatedblocks()
+    measure.restype = MallInfo
+    info = measure()
+    return info.uordblks + info.hblkhd, sys.getallocatedblocks()
+
+
+def test_a_thousand_sets_in_a_loop_with_drop_outs(bench):
+    """Through the node itself, on a clock of our own: half an hour at 0.5 Hz in seconds."""
     rng, names = np.random.default_rng(0), ('a', 'b', 'c')
     node = bench.add(IngestionNode, cameras=list(names), warm_up=False, wait_for_answer_s=0.0,
                      camera_timeout_s=0.3, explain_after_s=0.0, fuse_frames=3,
                      max_frame_age_s=0.0)
     assert node.trigger_configure() == TransitionCallbackReturn.SUCCESS
     assert node.trigger_activate() == TransitionCallbackReturn.SUCCESS
-    clock, sent, memory, objects = [10 ** 18], [], [], []
+    clock, sent, used = [10 ** 18], [], []
     node.now_ns = lambda: clock[0]
     publish = node.work.output.publish
     node.work.output.publish = lambda head, *rest: (
@@ -56,8 +82,8 @@ def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
                 away[name] = i + int(rng.integers(5, 40))
             if away[name] > i:
                 continue
-            # The bag begins anew every 500 sets, with the stamps that it has.
-            stamp = clock[0] - looped * 50_000 * MS
+            # The bag begins anew every LOOP sets, with the stamps that it has.
+            stamp = clock[0] - looped * LOOP * 100 * MS
             head = c.header(stamp + int(rng.integers(5 * MS)), f'{name}_optical')
             inputs[name]._on_info(c.camera_info_message(infos[name], head))
             inputs[name]._on_image(c.image_message(images[i % 4], '16UC1', head))
@@ -65,11 +91,10 @@ def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
         node.work._on_timer()
         if sent:
             node.work.pace._on_answer(PoseArray(header=c.header(sent[-1], 'table')))
-        if i % 500 == 499:
-            looped += 1
-            gc.collect()
-            memory.append(psutil.Process().memory_info().rss)
-            objects.append(len(gc.get_objects()))
+        looped = (i + 1) // LOOP
+        if i % 100 == 99:
+            memory, objects = allocated()
+            used.append((memory, objects - len(sent)))
         bench.executor.spin_once(timeout_sec=0)
     sets = node.work.assembly.sets
     waiting = len(names) - len(sets.missing())
@@ -80,8 +105,10 @@ def test_two_thousand_sets_in_a_loop_with_drop_outs(bench):
     assert all(reason in ('superseded', 'spread', 'time_jump')
                for _, reason in sets.drops), sets.drops
     assert looped == 4 and jumps >= 3 and len(sent) > 0.85 * SETS and len(sent) == node.work.number
-    assert memory[-1] - memory[1] < 8e6, memory
-    assert objects[-1] - objects[1] < 2000, objects
+    # A leak grows from each sample to the next, a buffer now and then.
+    memory, objects = np.median(np.diff(used, axis=0)[2:], axis=0)
+    # Of every set: 200 bytes, half an object.
+    assert memory < 20_000 and objects < 50, used
 
 
 def held():
@@ -124,7 +151,7 @@ def test_hundreds_of_sets_with_drop_outs_and_refusals_through_the_chain(bench, m
         given += len(there)
         assert bench.spin(settled), (i, there, stage, [bench.reasons(n) for n in bench.chain])
         refused[stage] += ingestion.number - before
-        if i % 100 == 99:
+        if i % 50 == 49:
             held_by.append(held())
     assert bench.spin(lambda: answers[0] == refused[None])
     told = {stage: node.diagnostics._counts[stage, 'refused']
@@ -137,8 +164,8 @@ def test_hundreds_of_sets_with_drop_outs_and_refusals_through_the_chain(bench, m
     # Sets of fewer cameras, and frames that waited for them.
     sets = ingestion.assembly.sets
     assert sets.used['a'] < ingestion.number and sets.drops.total() > 5
-    # One entry a set in any of them would be some eighty.
-    assert held_by[-1] - held_by[-2] < 50, held_by
+    # One entry a set in any of them would be some forty from each sample to the next.
+    assert np.median(np.diff(held_by)[1:]) < 20, held_by
 
 
 @pytest.mark.slow

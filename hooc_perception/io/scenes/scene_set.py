@@ -159,18 +159,19 @@ def _categories(path: Path, file: Path, entry: dict[str, Any]) -> tuple[Category
 def _meshes(path: Path, item: dict[str, Any], where: str) -> list[Path]:
     """Return the mesh files of a category, the generic one first."""
     if 'models' not in item:
-        return [files.file_inside(path, fields.required(item, 'model', where), f'{where} model')]
+        if 'model' not in item:
+            raise HoocError(f'{where} model is missing; add it, or models for several meshes')
+        return [files.file_inside(path, item['model'], f'{where} model')]
     if 'model' in item:
         raise HoocError(f'{where} has both model and models; keep one of them')
     names = fields.sequence(item['models'], f'{where} models')
     if not 1 <= len(names) <= MAX_MESHES:
         raise HoocError(f'{where} models has {len(names)} entries; give 1 to {MAX_MESHES} meshes')
     meshes = [files.file_inside(path, name, f'{where} models') for name in names]
-    resolved = [mesh.resolve() for mesh in meshes]
-    for name, mesh in zip(names, resolved):
-        if resolved.count(mesh) > 1:
-            raise HoocError(f'{where} models names {fields.short_repr(name)} twice; '
-                            'remove one of them')
+    fields.unique(names, f'{where} models')
+    if len({mesh.resolve() for mesh in meshes}) < len(meshes):
+        raise HoocError(f'{where} models names the same file twice '
+                        f'({fields.short_repr(names)}); remove one of them')
     return meshes
 
 

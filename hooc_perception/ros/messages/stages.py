@@ -208,14 +208,13 @@ def labels_json(models: Sequence[GenericModel], meshes: Sequence[Meshes],
     classes = {}
     for c, (model, family) in enumerate(zip(models, meshes), 1):
         members = [{'mesh': uri, 'sha256': digest,
-                    'extents_m': [round(float(x), 6) for x in shape.extents]}
+                    'extents_m': [round(float(x), 6) for x in shape.extents],
+                    'symmetry': [int(order) for order in shape.symmetry]}
                    for shape, (uri, digest) in zip(model.members, family)]
-        classes[str(c)] = {'name': model.name, **members[0],
-                           'symmetry': [int(order) for order in model.symmetry],
-                           'members': members}
-    named = {}
+        classes[str(c)] = {'name': model.name, **members[0], 'members': members}
+    found = {}
     for i, c, member in zip(ids, objects.category.tolist(), objects.member.tolist()):
         uri, digest = meshes[c - 1][member]
-        named[str(int(i))] = {'category': models[c - 1].name, 'class_id': c, 'member': member,
+        found[str(int(i))] = {'category': models[c - 1].name, 'class_id': c, 'member': member,
                               'mesh': uri, 'sha256': digest}
-    return json.dumps({'format': 'hooc-labels/1', 'classes': classes, 'objects': named})
+    return json.dumps({'format': 'hooc-labels/1', 'classes': classes, 'objects': found})

@@ -234,12 +234,12 @@ def test_labels_name_classes_and_objects():
                       member=np.array([0, 0, 1], np.uint16))
     content = json.loads(s.labels_json([Model('cup'), Model('ball', 1, Model('ball', 2))], meshes,
                                        [12, 13, 14], objects))
-    cup = {'mesh': 'file:///a', 'sha256': 'aa', 'extents_m': [1, 1, 1]}
-    ball = {'mesh': 'file:///b', 'sha256': 'bb', 'extents_m': [1, 1, 1]}
-    large = {'mesh': 'file:///b.1', 'sha256': 'b1', 'extents_m': [2, 2, 2]}
-    assert content['classes'] == {
-        '1': {'name': 'cup', **cup, 'symmetry': [1, 2, 0], 'members': [cup]},
-        '2': {'name': 'ball', **ball, 'symmetry': [1, 2, 0], 'members': [ball, large]}}
+    cup, ball, large = (
+        {'mesh': f'file:///{mesh}', 'sha256': digest, 'extents_m': [side] * 3,
+         'symmetry': [1, 2, 0]}
+        for mesh, digest, side in (('a', 'aa', 1), ('b', 'bb', 1), ('b.1', 'b1', 2)))
+    assert content['classes'] == {'1': {'name': 'cup', **cup, 'members': [cup]},
+                                  '2': {'name': 'ball', **ball, 'members': [ball, large]}}
     assert content['objects'] == {
         '12': {'category': 'ball', 'class_id': 2, 'member': 0, 'mesh': 'file:///b',
                'sha256': 'bb'},

@@ -29,6 +29,8 @@ class SceneObject:
     :ivar n_views: number of views that show it.
     :ivar sigma_t: metres, and `sigma_r` radians, within which 68 % of the errors lie; NaN where
         that is unknown, as for the rotation of a ball.
+    :ivar member: which mesh of its category's family was found, see GenericModel.members; 0 is
+        the generic one.
     """
 
     category: str
@@ -42,6 +44,7 @@ class SceneObject:
     n_views: int
     sigma_t: float = float('nan')
     sigma_r: float = float('nan')
+    member: int = 0
 
     @property
     def T_world_object(self) -> Float64Array:
@@ -120,4 +123,5 @@ def scene_of(parsed: ParsedScene, observation: Observation, models: tuple[Generi
                     found.rotation_xyzw[k], found.size[k], float(found.score[k]),
                     float(parsed.visible_ratio[k]), float(parsed.residual_m[k]),
                     float(parsed.energy_delta[k]), int(parsed.n_views[k]), float(sigma_t[k]),
-                    float(sigma_r[k])) for k in range(len(found))), parsed, observation, models)
+                    float(sigma_r[k]), int(found.member[k]))
+        for k in range(len(found))), parsed, observation, models)

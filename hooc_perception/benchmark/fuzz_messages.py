@@ -114,7 +114,7 @@ def _stage_case(rng: np.random.Generator, _: Path) -> None:
     head = c.header(5, 'table')
     candidates = Candidates(
         np.ones(n, np.uint16), rng.normal(size=(n, 3)), np.tile([0.0, 0, 0, 1], (n, 1)),
-        np.ones((n, 3), np.float32), np.ones(n, np.float32))
+        np.ones((n, 3), np.float32), np.ones(n, np.float32), (np.arange(n) % 2).astype(np.uint16))
     poses, attributes = candidates_messages(candidates, head)
     observation = observe([rectify(v) for v in _SCENE.depth()])
     rows = np.arange(n) % 3
@@ -127,7 +127,7 @@ def _stage_case(rng: np.random.Generator, _: Path) -> None:
         for item in getattr(message, 'fields', ()):
             _spoil(item, rng, 0.02)
     probabilities_from_message(probabilities, observation, 1)
-    candidates_from_messages(poses, attributes, 1)
+    candidates_from_messages(poses, attributes, [2])
 
 
 def _observation_case(rng: np.random.Generator, _: Path) -> None:

@@ -89,7 +89,8 @@ def _resized(model: GenericModel, name: str, factor: float) -> GenericModel:
                    extents=model.extents * factor,
                    surface_points=model.surface_points * np.float32(factor),
                    interior_points=model.interior_points * np.float32(factor),
-                   volume=model.volume * factor ** 3)
+                   volume=model.volume * factor ** 3,
+                   variants=tuple(_resized(v, name, factor) for v in model.variants))
 
 
 def scene_views(models: Sequence[GenericModel], views: int, objects: int, pixels: float,

@@ -147,7 +147,7 @@ def overlap_contest(scene: BenchScene) -> Contest:
 
 def _solid(pool: Candidates, models: Sequence[GenericModel], k: int) -> manifold3d.Manifold:
     """Return the manifold3d solid of a candidate."""
-    model = models[pool.category[k] - 1]
+    model = pool.take([k]).shapes(models)[0]
     mesh = closed(trimesh.Trimesh(model.vertices, model.faces, process=False))
     vertices = np.asarray(mesh.vertices) * (pool.size[k] / model.extents)
     T_world_model = matrix_from_pose(pool.translation[k], pool.rotation_xyzw[k])

@@ -66,8 +66,7 @@ def bench_scene(seed: int = 0, n_objects: int = 20) -> BenchScene:
 def candidate_meshes(scene: BenchScene) -> list[tuple[Float64Array, Int32Array]]:
     """Return [(vertices world, faces)] of the pool of a BenchScene."""
     pool, out = scene.pool, []
-    for k in range(len(pool)):
-        model = scene.models[pool.category[k] - 1]
+    for k, model in enumerate(pool.shapes(scene.models)):
         out.append((posed_vertices(model, pool.translation[k], pool.rotation_xyzw[k],
                                    pool.size[k]), model.faces))
     return out

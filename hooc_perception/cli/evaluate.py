@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from hooc_perception.evaluation.tables import Table
     from hooc_perception.evaluation.visibility import Visibility
     from hooc_perception.io.scenes.scene_set import SceneSet
+    from hooc_perception.trained.folder import ModelFolder
 
 HELP = ("Score results against the ground truth of a scene set: the paper's Tables 1-4 and "
         'stricter scores (centre within 2 cm, rotation up to symmetry). Scenes with instance '
@@ -43,7 +44,8 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument('--bop', action='store_true',
                         help="compute BOP's average recalls of VSD, MSSD and MSPD (slower)")
     parser.add_argument('--model', metavar='MODEL',
-                        help='model folder: adds the energy of the true poses to Table 4')
+                        help='model folder that gave the results: adds the energy of the true '
+                        'poses to Table 4, and draws objects with the meshes of its families')
     parser.add_argument('--json', metavar='FILE', help='write all scores as JSON')
     parser.add_argument('--markdown', metavar='FILE', help='write the tables as Markdown')
     parser.add_argument('--plots', metavar='DIR', help='write plots of the scores (PNG)')
@@ -57,6 +59,7 @@ def run(args: Namespace) -> None:
     from hooc_perception.evaluation.as_json import as_json
     from hooc_perception.evaluation.evaluate import evaluate_results, scoring_models, table_1
     from hooc_perception.io.scenes.scene_set import load_scene_set
+    from hooc_perception.trained.folder import load_model_folder
 
     file_place(args.json, '--json')
     file_place(args.markdown, '--markdown')
@@ -64,12 +67,13 @@ def run(args: Namespace) -> None:
     whole_set = load_scene_set(args.set)
     scene_set = whole_set.selected(args.scene)
     contents = [load_matching(path, whole_set) for path in args.results]
-    models = scoring_models(scene_set)
+    folder = load_model_folder(args.model) if args.model else None
+    models = scoring_models(scene_set, trained=folder.models if folder else ())
     visibility = table_1(scene_set, models)
     evaluations = [evaluate_results(scene_set, content, models, label,
                                     visibility if args.bop else None)
                    for label, content in zip(_labels(args.results), contents)]
-    truth_energy = _truth_energy(scene_set, args.model) if args.model else {}
+    truth_energy = _truth_energy(scene_set, folder) if folder else {}
     tables = _tables(evaluations, scene_set, visibility, truth_energy)
     full = _visibility_tables(visibility)
     if not tables:
@@ -92,12 +96,10 @@ def _labels(paths: Sequence[str]) -> list[str]:
     return [f'{file.parent.name}/{file.stem}' for file in files]
 
 
-def _truth_energy(scene_set: 'SceneSet', model: str) -> dict[str, 'Energy']:
+def _truth_energy(scene_set: 'SceneSet', folder: 'ModelFolder') -> dict[str, 'Energy']:
     """Return {scene: Energy of the true poses}; the classifier of a model folder is needed."""
     from hooc_perception.cli.categories import warn_of_gap
     from hooc_perception.evaluation.rerun import rerun
-    from hooc_perception.trained.folder import load_model_folder
-    folder = load_model_folder(model)
     warn_of_gap([m.name for m in folder.models], scene_set.category_names, scene_set.path)
     return rerun(scene_set, folder)[0]
 

@@ -29,8 +29,8 @@ def add_arguments(parser: ArgumentParser) -> None:
                         help='scene set of the results (default: the set or the bags that the '
                         'results name)')
     parser.add_argument('--model', metavar='MODEL',
-                        help='model folder: adds a picture of the most likely class of every '
-                        'pixel')
+                        help='model folder that gave the results: adds a picture of the most '
+                        'likely class of every pixel, and draws the meshes of its families')
     parser.add_argument('--candidates', action='store_true',
                         help='run the chain of --model again to list the rejected candidates')
     parser.add_argument('--out', metavar='PATH', default='report.html',

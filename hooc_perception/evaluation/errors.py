@@ -7,7 +7,8 @@ Definitions: Hodan et al., "BOP Challenge 2019" and "BOP: Benchmark for 6D Objec
 Estimation" (ECCV 2018). BOP's models have the true size; here estimate and truth are one
 generic model at two sizes, so a pose is the affine map x -> R diag(size / extents) x + t of the
 model, and a symmetry S acts on the model before the truth's scale does. With equal sizes every
-error is BOP's own.
+error is BOP's own. Both are drawn as the generic mesh, whichever mesh of its category's family an
+estimate was found with: the errors are those of its pose and size.
 """
 
 from collections.abc import Sequence

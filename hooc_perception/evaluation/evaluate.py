@@ -3,7 +3,7 @@
 """Score a results file against a scene set: all figures that the tables show."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from hooc_perception.core.geometry import stage_rng
@@ -21,6 +21,7 @@ from hooc_perception.objects.mesh import load_mesh
 from hooc_perception.objects.repair import closed
 from hooc_perception.objects.symmetry import axis_symmetry
 import numpy as np
+import trimesh
 
 # Scores use the whole image, including readings that the chain ignores as too far away.
 RECTIFY = ObserveConfig(max_depth_m=20.0)
@@ -54,23 +55,34 @@ class Evaluation:
                             categories)
 
 
-def scoring_models(scene_set: SceneSet, seed: int = 0) -> dict[str, GenericModel]:
+def scoring_models(scene_set: SceneSet, seed: int = 0,
+                   trained: Iterable[GenericModel] = ()) -> dict[str, GenericModel]:
     """
     Return {category: GenericModel} of a set's meshes, with shape, extents and symmetry only.
 
     Samples and resting poses, which scores do not use, are empty: this takes a fraction of the
     time of deriving everything.
+
+    :param trained: the models that the results were found with. Their variants take the place of
+        the set's own, which lack those of the built-in catalogue.
     """
-    none = np.zeros((0, 3), np.float32)
-    out = {}
+    out, known = {}, {model.name: model.variants for model in trained}
     for category in scene_set.categories:
-        mesh = load_mesh(category.mesh_path, category.scale)
-        out[category.name] = GenericModel(
-            category.name, np.ascontiguousarray(mesh.vertices, np.float64),
-            np.ascontiguousarray(mesh.faces, np.int32), np.array(mesh.extents, np.float64),
-            none, none, none, 0.0, np.zeros((0, 4)), np.zeros(0),
-            axis_symmetry(closed(mesh), stage_rng(seed, 'symmetry')))
+        paths = category.variant_paths if category.name not in known else ()
+        model, *variants = (_scoring_model(category.name, load_mesh(path, category.scale), seed)
+                            for path in (category.mesh_path, *paths))
+        out[category.name] = replace(model, variants=known.get(category.name, tuple(variants)))
     return out
+
+
+def _scoring_model(name: str, mesh: trimesh.Trimesh, seed: int) -> GenericModel:
+    """Return a GenericModel without samples and resting poses."""
+    none = np.zeros((0, 3), np.float32)
+    return GenericModel(
+        name, np.ascontiguousarray(mesh.vertices, np.float64),
+        np.ascontiguousarray(mesh.faces, np.int32), np.array(mesh.extents, np.float64),
+        none, none, none, 0.0, np.zeros((0, 4)), np.zeros(0),
+        axis_symmetry(closed(mesh), stage_rng(seed, 'symmetry')))
 
 
 def table_1(scene_set: SceneSet, models: Mapping[str, GenericModel],

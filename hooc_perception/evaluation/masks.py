@@ -9,7 +9,7 @@ from hooc_perception.core.arrays import AnyArray, BoolArray, Float64Array, Int64
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import GenericModel, RectifiedView
 from hooc_perception.evaluation.errors import world_mesh
-from hooc_perception.evaluation.matching import PosedObject
+from hooc_perception.evaluation.matching import PosedObject, shape_of
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
@@ -72,7 +72,7 @@ def score_masks(name: str, estimates: Sequence[PosedObject], models: Mapping[str
     :param views: RectifiedViews whose camera is that of the labels.
     :param labels: mapping camera name -> (H, W) uint8 instance labels, rectified too.
     """
-    meshes = [world_mesh(e, models[e.category]) for e in estimates]
+    meshes = [world_mesh(e, shape_of(e, models)) for e in estimates]
     explained = labelled = estimated = 0
     ious: list[float] = []
     for view in views:

@@ -2,13 +2,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which estimate belongs to which true object: one to one within a category."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import inverse, matrix_from_pose, pose_from_matrix
-from hooc_perception.core.types import Candidates
+from hooc_perception.core.types import Candidates, GenericModel
 from hooc_perception.errors import HoocError
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -24,6 +24,8 @@ class PosedObject:
     :ivar size: (3,) extents along the model axes, metres.
     :ivar score: of an estimate; 1 for a true object.
     :ivar sigma_t, sigma_r: of an estimate, metres and radians; NaN where unknown.
+    :ivar member: of an estimate, which mesh of its category's family was found; 0 = the generic
+        one.
     """
 
     category: str
@@ -33,6 +35,7 @@ class PosedObject:
     score: float = 1.0
     sigma_t: float = float('nan')
     sigma_r: float = float('nan')
+    member: int = 0
 
 
 def posed(thing: Any) -> PosedObject:
@@ -47,7 +50,7 @@ def posed(thing: Any) -> PosedObject:
                            np.asarray(get('size'), np.float64).reshape(3),
                            1.0 if score is None else float(score),
                            *(float('nan') if sigma is None else float(sigma)
-                             for sigma in sigmas))
+                             for sigma in sigmas), int(get('member') or 0))
     except (TypeError, ValueError) as error:
         raise HoocError(f'object {get("category")!r} has no usable pose: {error}; give '
                         'translation (3), rotation_xyzw (4) and size (3)') from None
@@ -57,8 +60,23 @@ def candidate_objects(candidates: Candidates, names: Sequence[str]) -> list[Pose
     """Return Candidates as PosedObjects; `names` are those of class ids 1..N."""
     return [PosedObject(names[int(c) - 1], candidates.translation[i],
                         candidates.rotation_xyzw[i], candidates.size[i].astype(np.float64),
-                        float(candidates.score[i]))
+                        float(candidates.score[i]), member=int(candidates.member[i]))
             for i, c in enumerate(candidates.category)]
+
+
+def shape_of(thing: PosedObject, models: Mapping[str, GenericModel]) -> GenericModel:
+    """
+    Return the mesh with which an object was found.
+
+    :param models: mapping category name -> GenericModel. Those of a scene set lack the meshes
+        that training takes from the built-in catalogue; the generic mesh takes their place.
+    """
+    return models[thing.category].members[member_of(thing, models)]
+
+
+def member_of(thing: PosedObject, models: Mapping[str, GenericModel]) -> int:
+    """Return the place of the mesh of `shape_of` in its family."""
+    return thing.member if thing.member < len(models[thing.category].members) else 0
 
 
 def in_frame_of(scene: Any, entry: dict[str, Any]) -> dict[str, Any]:

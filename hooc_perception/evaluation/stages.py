@@ -42,7 +42,8 @@ def as_candidates(objects: Iterable[PosedObject], models: Sequence[GenericModel]
                       np.array([o.translation for o in kept], np.float64),
                       np.array([o.rotation_xyzw for o in kept], np.float64),
                       np.array([o.size for o in kept], np.float32),
-                      np.array([o.score for o in kept], np.float32))
+                      np.array([o.score for o in kept], np.float32),
+                      np.array([o.member for o in kept], np.uint16))
 
 
 def as_objects(candidates: Candidates, models: Sequence[GenericModel]) -> list[PosedObject]:

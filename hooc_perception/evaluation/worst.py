@@ -15,7 +15,7 @@ from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.as_json import plain
 from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.evaluate import Evaluation, RECTIFY
-from hooc_perception.evaluation.matching import posed, PosedObject
+from hooc_perception.evaluation.matching import posed, PosedObject, shape_of
 from hooc_perception.evaluation.scores import ObjectScore, SceneScore
 from hooc_perception.evaluation.tables import Cell, Table
 from hooc_perception.io.scenes.files import read_json
@@ -146,7 +146,7 @@ def _pixels(truths: Sequence[PosedObject], estimates: Sequence[PosedObject],
     Numbers of pixels that show each of n true objects in each view, that would show it if it
     stood alone, and, over all views, of those of the first at which each of m estimates shows.
     """
-    true, answer = ([world_mesh(o, models[o.category]) for o in objects]
+    true, answer = ([world_mesh(o, shape_of(o, models)) for o in objects]
                     for objects in (truths, estimates))
     shown, alone = (np.zeros((len(true), len(views)), int) for _ in range(2))
     taken = np.zeros((len(true), len(answer)), int)

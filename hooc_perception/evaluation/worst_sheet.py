@@ -12,6 +12,7 @@ from hooc_perception.core.arrays import BoolArray, Float64Array, Int32Array
 from hooc_perception.core.render import render_depth, render_patch
 from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.evaluation.errors import world_mesh
+from hooc_perception.evaluation.matching import shape_of
 from hooc_perception.evaluation.report.pictures import depth_picture
 from hooc_perception.evaluation.tables import to_markdown
 from hooc_perception.evaluation.worst import worst_json, worst_table, WorstScene
@@ -87,7 +88,7 @@ def _panel(ax: Axes, scene: WorstScene, models: Mapping[str, GenericModel]) -> N
     camera, depth = scene.view.camera, scene.view.depth
     true = [world_mesh(t, models[t.category]) for t in scene.truths]
     shown = render_depth(true, camera)[1]
-    estimated = [world_mesh(e, models[e.category]) for e in scene.estimates]
+    estimated = [world_mesh(e, shape_of(e, models)) for e in scene.estimates]
     answer = render_depth(estimated, camera)[1]
     missed = {m.truth for m in scene.missed}
     box = [_window((shown >= 0) | np.isin(answer, scene.wrong))]

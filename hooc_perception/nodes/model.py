@@ -39,6 +39,13 @@ def parser_of(node: StageNode[StageConfig, Any], model: ModelFolder,
                   model.max_instances if max_instances is None else max_instances, sigmas)
 
 
+def mesh_uris(model: ModelFolder) -> list[list[tuple[str, str]]]:
+    """Return (URI, sha256 in hex) of each member of the family of each category."""
+    return [[(path.resolve().as_uri(), digest) for path, digest in (
+        model.mesh_of(generic.name, k) for k in range(len(generic.members)))]
+        for generic in model.models]
+
+
 def node_profile(node: StageNode[StageConfig, Any], model: ModelFolder) -> Profile:
     """Return the profile of a StageNode, with the parameters of its stages as they are now."""
     chosen = profile(node.config.profile or model.profile)

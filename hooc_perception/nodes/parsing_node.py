@@ -22,7 +22,13 @@ from hooc_perception.core.types import (
     ParsedScene,
     PixelProbabilities,
 )
-from hooc_perception.nodes.model import camera_names, model_of, node_profile, parser_of
+from hooc_perception.nodes.model import (
+    camera_names,
+    mesh_uris,
+    model_of,
+    node_profile,
+    parser_of,
+)
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.health.diagnostics import WARN
 from hooc_perception.ros.inputs.view_input import ViewInput
@@ -109,9 +115,7 @@ class Parsing:
                                  node.config.sigmas)
         warmed(node, model, self._try_out)
         self._tracker = Tracker(model.models, node.config)
-        self.output = ObjectOutput(node, model.models, [
-            (model.mesh_path(m.name).resolve().as_uri(), model.mesh_sha256[m.name])
-            for m in model.models])
+        self.output = ObjectOutput(node, model.models, mesh_uris(model))
         self.input = ViewInput(node, camera_names(node, model), 'parse', {
             'probabilities': (PointCloud2, 'pixels/probabilities'),
             'poses': (PoseArray, 'candidates/poses'),
@@ -138,7 +142,8 @@ class Parsing:
         """Return the ParsedScene of what came together for one stamp."""
         n = len(self.models)
         probabilities = probabilities_from_message(messages['probabilities'], observation, n)
-        pool = candidates_from_messages(messages['poses'], messages['attributes'], n)
+        pool = candidates_from_messages(messages['poses'], messages['attributes'],
+                                        [len(model.members) for model in self.models])
         self._parser = self._parser.changed(node_profile(self._node, self._model),
                                             self._node.config.sigmas)
         return self._parser.decide(self._parser.frame(observation, probabilities), pool,

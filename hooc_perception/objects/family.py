@@ -67,7 +67,7 @@ def with_family(model: GenericModel, rng: np.random.Generator,
     for _ in range(min(members, len(meshes))):
         chosen.append(int(np.argmax(apart[chosen].min(0))))
     return replace(model, variants=model.variants + tuple(
-        derive(model.name, meshes[k - 1], rng) for k in chosen[1:]))
+        replace(derive(model.name, meshes[k - 1], rng), built_in=True) for k in chosen[1:]))
 
 
 def _aligning(mesh: trimesh.Trimesh, model: GenericModel) -> Float64Array:

@@ -5,7 +5,8 @@ The shapes from which the objects of training scenes are made.
 
 A category is more than one mesh: where the built-in catalogue has a family of its name, its
 members (relatives) take part in training beside the mesh of the set; where it has none, strongly
-reshaped copies of that mesh do. They teach what varies between objects of one kind; the answer
+reshaped copies of that mesh do. Further meshes of a category that the set gives are relatives as
+well. They teach what varies between objects of one kind; the answer
 still speaks of the meshes of the set alone. Relatives belong to folds. Every tree of the
 classifier sees all folds but one, so that a scene with the members of that one shows how well
 the tree does on shapes that it has never seen.
@@ -71,6 +72,8 @@ def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
                        for n, style in enumerate(styles[family]) for draw in range(DRAWS)]
         else:
             wanted += [(index, -1, copy % FOLDS, copy) for copy in range(COPIES)]
+    given = [(index, shape, k % FOLDS) for index, model in enumerate(models)
+             for k, shape in enumerate(v for v in model.variants if not v.built_in)]
     made = Parallel(n_jobs=jobs)(
         delayed(_relative)(models[index], style, fold,
                            stage_rng(seed, 'relatives', index, style + 1, draw))
@@ -78,6 +81,9 @@ def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
     population: list[list[Relative]] = [[] for _ in models]
     for (index, *_), relative in zip(wanted, made):
         population[index].append(relative)
+    solid = Parallel(n_jobs=jobs)(delayed(_pieces)(shape) for _, shape, _ in given)
+    for (index, shape, fold), pieces in zip(given, solid):
+        population[index].append(Relative(shape, pieces, fold))
     return tuple(tuple(each) for each in population)
 
 
@@ -89,5 +95,9 @@ def _relative(model: GenericModel, style: int, fold: int, rng: np.random.Generat
     else:
         mesh = family_meshes(model, (style,), (rng,))[0]
     shape = derive(model.name, mesh, rng, SURFACE_POINTS, INTERIOR_POINTS)
-    solid = closed(trimesh.Trimesh(shape.vertices, shape.faces, process=False))
-    return Relative(shape, convex_pieces(solid), fold)
+    return Relative(shape, _pieces(shape), fold)
+
+
+def _pieces(shape: GenericModel) -> list[Float64Array]:
+    """Return the convex vertex sets (n, 3) that cover a mesh."""
+    return convex_pieces(closed(trimesh.Trimesh(shape.vertices, shape.faces, process=False)))

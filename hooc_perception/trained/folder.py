@@ -5,7 +5,8 @@ The MODEL folder: the output of `hooc train` and the input of every other comman
 
     model.json              format, name, profile, seed, cameras, categories, checksums
     models.npz              everything derived from the generic models
-    meshes/<category>.ply   the cleaned meshes, for viewers
+    meshes/<category>.ply   the cleaned generic meshes, for viewers; those of the further
+                            members of a family are <category>.1.ply, <category>.2.ply, ...
     classifier/<key>.npy    the arrays of the decision forests, memory-mapped when read
 
 It holds plain data only. Every file is listed with its size and SHA-256 in model.json; reading
@@ -49,7 +50,8 @@ class ModelFolder:
     :ivar classifier: named arrays, the input of core.classification.classify.
     :ivar cameras: the cameras that it was trained for.
     :ivar max_instances: most objects of one category in a scene, 0 = no limit.
-    :ivar mesh_sha256: category name -> hex SHA-256 of its mesh file.
+    :ivar mesh_sha256: name of a mesh file without its ending, such as `pan` and `pan.1` -> its
+        hex SHA-256.
     """
 
     path: Path
@@ -62,9 +64,13 @@ class ModelFolder:
     max_instances: int = 0
     mesh_sha256: dict[str, str] = field(default_factory=dict)
 
-    def mesh_path(self, category: str) -> Path:
-        """Return the path of a category's cleaned mesh."""
-        return self.path / _mesh_file(category)
+    def mesh_path(self, category: str, member: int = 0) -> Path:
+        """Return the path of a category's cleaned mesh; `member` is its place in the family."""
+        return self.path / _mesh_file(_mesh_name(category, member))
+
+    def mesh_of(self, category: str, member: int = 0) -> tuple[Path, str]:
+        """Return (path, hex SHA-256) of a member of a category's family."""
+        return self.mesh_path(category, member), self.mesh_sha256[_mesh_name(category, member)]
 
 
 def save_model_folder(path: str | Path, name: str, models: Sequence[GenericModel],
@@ -76,7 +82,7 @@ def save_model_folder(path: str | Path, name: str, models: Sequence[GenericModel
     An older MODEL folder at `path` is replaced; anything else there is left alone.
 
     :raises HoocError: if the path is taken, a name is unfit for a file, two categories would
-        share a topic, or an array does not hold plain numbers.
+        share a file or a topic, or an array does not hold plain numbers.
     """
     path = Path(path)
     check_place(path, [model.name for model in models])
@@ -119,6 +125,11 @@ def check_place(path: str | Path, names: Sequence[str]) -> None:
             raise HoocError(f'the categories {seen[name.lower()]!r} and {name!r} would share a '
                             f'file in {path} on case-insensitive file systems; rename one')
         seen[name.lower()] = name
+    for low, name in seen.items():
+        stem, _, number = low.rpartition('.')
+        if number.isdecimal() and stem in seen:
+            raise HoocError(f'the category {name!r} and a further mesh of {seen[stem]!r} would '
+                            f'share a file in {path}; rename one of them')
     check_categories(names, str(path))
 
 
@@ -135,10 +146,14 @@ def load_model_folder(path: str | Path) -> ModelFolder:
                  *map(_array_file, meta.classifier_keys)):
         check_file(path, file, meta.files)
     models = read_models(path / 'models.npz', meta.categories)
+    meshes = [_mesh_name(model.name, k) for model in models for k in range(len(model.members))]
+    for mesh in meshes:
+        if mesh not in meta.categories:
+            check_file(path, _mesh_file(mesh), meta.files)
     classifier = {key: load_plain_array(path / _array_file(key)) for key in meta.classifier_keys}
     return ModelFolder(path, meta.name, models, classifier, meta.profile, meta.seed, meta.cameras,
                        meta.max_instances,
-                       {name: meta.files[_mesh_file(name)].sha256 for name in meta.categories})
+                       {mesh: meta.files[_mesh_file(mesh)].sha256 for mesh in meshes})
 
 
 def _write_data(folder: Path, models: Sequence[GenericModel],
@@ -149,8 +164,9 @@ def _write_data(folder: Path, models: Sequence[GenericModel],
     (folder / 'meshes').mkdir()
     (folder / 'classifier').mkdir()
     for model in models:
-        mesh = trimesh.Trimesh(model.vertices, model.faces, process=False)
-        mesh.export(folder / _mesh_file(model.name))
+        for k, member in enumerate(model.members):
+            mesh = trimesh.Trimesh(member.vertices, member.faces, process=False)
+            mesh.export(folder / _mesh_file(_mesh_name(model.name, k)))
     write_models(folder / 'models.npz', models)
     for key, array in classifier.items():
         array = np.ascontiguousarray(array) if np.ndim(array) else np.asarray(array)
@@ -160,9 +176,14 @@ def _write_data(folder: Path, models: Sequence[GenericModel],
         np.save(folder / _array_file(key), array, allow_pickle=False)
 
 
-def _mesh_file(category: str) -> str:
-    """Return the path of a category's mesh relative to the folder."""
-    return f'meshes/{category}.ply'
+def _mesh_name(category: str, member: int) -> str:
+    """Return the name of the mesh of a member of a category's family."""
+    return f'{category}.{member}' if member else category
+
+
+def _mesh_file(mesh: str) -> str:
+    """Return the path of a mesh relative to the folder."""
+    return f'meshes/{mesh}.ply'
 
 
 def _array_file(key: str) -> str:

@@ -8,7 +8,7 @@ returns arrays, which are stored with the classifier, and may read those of the 
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 import json
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
@@ -59,7 +59,12 @@ class TrainedCategory(Protocol):
 
     @property
     def scale(self) -> float:
-        """Return the factor from units of the mesh to metres."""
+        """Return the factor from units of the meshes to metres."""
+        ...
+
+    @property
+    def variant_paths(self) -> Sequence[Path]:
+        """Return the files of its further meshes."""
         ...
 
 
@@ -123,12 +128,15 @@ def train(scene_set: TrainingSet, out: str | Path, profile: str = 'best', seed: 
 
 def generic_models(scene_set: TrainingSet, seed: int,
                    progress: bool = False) -> tuple[GenericModel, ...]:
-    """Return the generic models of a set's categories, in class order."""
+    """Return the generic models of a set's categories with their variants, in class order."""
     models = []
     for index, category in enumerate(tqdm(scene_set.categories, desc='generic models',
                                           unit='model', disable=not progress)):
-        mesh = load_mesh(category.mesh_path, category.scale)
-        models.append(derive(category.name, mesh, stage_rng(seed, 'derive', index)))
+        first, *variants = (
+            derive(category.name, load_mesh(path, category.scale),
+                   stage_rng(seed, 'derive', index, member))
+            for member, path in enumerate((category.mesh_path, *category.variant_paths)))
+        models.append(replace(first, variants=tuple(variants)))
     return tuple(models)
 
 

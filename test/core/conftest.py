@@ -103,9 +103,9 @@ def desk_with(models, truth, seed=0):
     rng = np.random.default_rng(seed)
     cameras = tuple(camera(f'camera{i}', 0.3 + 2 * np.pi * i / 3, 0.75, 0.75, height=120,
                            focal=190.0) for i in range(3))
-    meshes = [(posed_vertices(models[truth.category[i] - 1], truth.translation[i],
-                              truth.rotation_xyzw[i], truth.size[i]),
-               models[truth.category[i] - 1].faces) for i in range(len(truth))]
+    meshes = [(posed_vertices(shape, truth.translation[i], truth.rotation_xyzw[i],
+                              truth.size[i]), shape.faces)
+              for i, shape in enumerate(truth.shapes(models))]
     clean, classes, views = [], [], []
     for c in cameras:
         depth, ids = render_depth([*meshes, table()], c)

@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Mask scores: known masks, and the scorer beside the repository."""
 
+from dataclasses import replace
 import json
 import subprocess
 import sys
@@ -40,6 +41,34 @@ def test_no_estimates():
     labels = np.ones((40, 40), np.uint8)
     values, partner, iou = match_masks(np.full((40, 40), -1), 0, labels, labels > 0)
     assert values == [1] and list(partner) == [-1] and list(iou) == [0]
+
+
+def test_masks_are_those_of_the_mesh_that_was_found(tiny, models, truth_results):
+    entry = next(e for e in truth_results['scenes'] if e['scene'] == 'labelled')
+    can = next(o for o in entry['objects'] if o['category'] == 'can')
+    can['category'] = 'ball'
+    families = {**models, 'ball': replace(models['ball'], variants=(models['can'],))}
+
+    def worst_iou(member, known):
+        can['member'] = member
+        return min(evaluate_results(tiny, truth_results, known).masks[0].iou)
+
+    assert worst_iou(0, families) < 0.9 and worst_iou(1, families) > 0.99
+    # Without that mesh the generic one is drawn.
+    assert worst_iou(1, models) == worst_iou(0, models)
+
+
+def test_models_have_the_variants_of_the_set_or_of_the_model(tiny, models):
+    ball, box, can = tiny.categories
+    family = replace(box, variant_paths=(can.mesh_path,), scale=0.5)
+    scene_set = replace(tiny, categories=(ball, family))
+    own = scoring_models(scene_set)
+    assert own['ball'].variants == ()
+    np.testing.assert_allclose(own['box'].variants[0].extents, models['can'].extents / 2)
+    variants = (models['ball'], models['can'])
+    trained = scoring_models(scene_set, trained=[replace(models['box'], variants=variants)])
+    assert trained['box'].variants == variants and trained['ball'].variants == ()
+    np.testing.assert_allclose(trained['box'].extents, models['box'].extents / 2)
 
 
 def test_agrees_with_the_independent_scorer(shared_scenes, tmp_path):

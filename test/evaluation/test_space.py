@@ -3,6 +3,7 @@
 """The 3D view: its data say where things are; a browser shows, turns and picks them."""
 
 import base64
+from dataclasses import replace
 import importlib.util
 import json
 from pathlib import Path
@@ -55,6 +56,26 @@ def test_models_stand_where_the_results_say(page, scene):
         np.testing.assert_array_equal(numbers(mesh['f'], '<u2').reshape(-1, 3), faces)
 
 
+def test_an_object_is_drawn_with_the_mesh_that_was_found(scene, tmp_path):
+    category = scene.objects[0].category
+    other = next(m for name, m in scene.models.items() if name != category)
+    family = replace(scene.models[category], variants=(replace(other, name=category),))
+    things = [replace(scene.objects[0], member=k) for k in (0, 1, 7)]
+    changed = replace(scene, objects=tuple(things), evidence=(), truth=tuple(things[:1]),
+                      models={**scene.models, category: family})
+    data, meshes = data_of(write_report(tmp_path / 'x.html', [changed]))
+    # A model that does not have the mesh: the generic one takes its place.
+    assert [o['mesh'] for o in data['objects']] == [category, f'{category}/1', category]
+    assert data['truth'][0]['mesh'] == category
+    for thing, given, shape in zip(data['objects'], things, (family, other, family)):
+        at = np.array(thing['at'])
+        mesh = meshes[thing['mesh']]
+        np.testing.assert_allclose(mesh['extents'], shape.extents)
+        local = (numbers(mesh['v'], '<u2').reshape(-1, 3) / 65535 - 0.5) * mesh['extents']
+        np.testing.assert_allclose(local @ at[:9].reshape(3, 3) + at[9:],
+                                   world_mesh(given, shape)[0], atol=1e-5)
+
+
 def test_points_are_the_measured_ones_in_their_groups(page, scene):
     cloud = data_of(page)[0]['cloud']
     points = numbers(cloud['p'], '<u2').reshape(-1, 3) / 65535 * cloud['span'] + cloud['low']
@@ -70,7 +91,6 @@ def test_points_are_the_measured_ones_in_their_groups(page, scene):
 
 
 def test_names_cannot_end_the_script(scene, tmp_path):
-    from dataclasses import replace
     bad = '</script><b>x'
     thing, model = scene.objects[0], scene.models[scene.objects[0].category]
     changed = replace(scene, objects=(replace(thing, category=bad),), truth=None,

@@ -37,7 +37,8 @@ def test_cpp_client_reads_what_the_parsing_node_writes(repository, tmp_path):
     parsed = ParsedScene(objects, Energy(0, 0, 0), some, some, some, np.ones(2, np.uint8), objects)
     cloud = objects_messages(parsed, [7, 90000], 0.1, c.header(5, 'table'))[1]
     files = {name: tmp_path / name for name in ('LABELS', 'HEAD', 'DATA')}
-    files['LABELS'].write_text(labels_json(models, [('file:///x', 'ab')] * 2, [7], [2]))
+    files['LABELS'].write_text(labels_json(models, [[('file:///x', 'ab')]] * 2, [7, 90000],
+                                           objects))
     files['HEAD'].write_text(f'table {cloud.width} {cloud.point_step}\n' + ''.join(
         f'{f.name} {f.offset} {f.datatype}\n' for f in cloud.fields))
     files['DATA'].write_bytes(bytes(cloud.data))

@@ -52,7 +52,7 @@ def say():
                              objects)
         ids = np.arange(7, 7 + n)
         attributes.publish(objects_messages(parsed, ids, 0.1, c.header(stamp_ns, 'table'))[1])
-        labels.publish(String(data=labels_json(models, [('', '')] * 2, ids, objects.category)))
+        labels.publish(String(data=labels_json(models, [[('', '')]] * 2, ids, objects)))
 
     yield publish, {**os.environ, 'ROS_DOMAIN_ID': str(domain),
                     'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST'}

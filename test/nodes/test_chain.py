@@ -165,7 +165,9 @@ def test_ids_stay_with_objects_until_they_are_reset(chain):
     assert [(m.ns, m.id) for m in gone] == [('can', can)]
     assert ids([2]) == [can]
     labels = json.loads(heard['objects/labels'][-1].data)
-    assert labels['objects'] == {str(can): {'category': 'can', 'class_id': 3}}
+    assert labels['objects'] == {str(can): {
+        'category': 'can', 'class_id': 3, 'member': 0,
+        **{key: labels['classes']['3'][key] for key in ('mesh', 'sha256')}}}
     assert bench.spin(call(bench, Trigger, 'reset').done)
     bench.rest(0.3)
     assert not {box, can} & set(ids([0, 2]))

@@ -3,13 +3,18 @@
 """The MODEL folder: what is saved comes back, and what was tampered with does not."""
 
 from dataclasses import replace
+import hashlib
 import json
 import shutil
 
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.objects.derive import derive
-from hooc_perception.trained.folder import load_model_folder, save_model_folder
+from hooc_perception.trained.folder import (
+    check_place,
+    load_model_folder,
+    save_model_folder,
+)
 import numpy as np
 import pytest
 import trimesh
@@ -55,14 +60,104 @@ def _rejected(folder, words):
     assert '\n' not in str(caught.value)
 
 
+def _same(a, b):
+    """Assert that two GenericModels are equal, and so are their variants."""
+    assert len(a.variants) == len(b.variants)
+    for key in vars(a).keys() - {'variants'}:
+        np.testing.assert_array_equal(getattr(a, key), getattr(b, key))
+        assert np.asarray(getattr(a, key)).dtype == np.asarray(getattr(b, key)).dtype
+    for one, other in zip(a.variants, b.variants):
+        _same(one, other)
+
+
+@pytest.fixture(scope='module')
+def families(models):
+    """Return two categories, the second with three meshes."""
+    box, ball, can = models
+    return (ball, replace(box, variants=(replace(can, name='box'),
+                                         replace(ball, name='box', built_in=True))))
+
+
+@pytest.fixture
+def family_folder(families, tmp_path):
+    """Return a MODEL folder of them."""
+    path = tmp_path / 'families'
+    save_model_folder(path, 'kitchen', families, CLASSIFIER, 'fast', 7, (CAMERA,), 1)
+    return path
+
+
+def test_families_there_and_back(family_folder, families):
+    back = load_model_folder(family_folder)
+    assert [m.name for m in back.models] == ['ball', 'box']
+    for a, b in zip(families, back.models):
+        _same(a, b)
+    assert sorted(p.name for p in (family_folder / 'meshes').iterdir()) == [
+        'ball.ply', 'box.1.ply', 'box.2.ply', 'box.ply']
+    for model in families:
+        for k, member in enumerate(model.members):
+            path, digest = back.mesh_of(model.name, k)
+            assert path == back.mesh_path(model.name, k)
+            assert digest == hashlib.sha256(path.read_bytes()).hexdigest()
+            np.testing.assert_allclose(trimesh.load(path, process=False).extents, member.extents,
+                                       rtol=1e-5)
+    assert back.mesh_of('box') == back.mesh_of('box', 0) == (
+        family_folder / 'meshes' / 'box.ply', back.mesh_sha256['box'])
+
+
+def test_meshes_of_members_are_checked_too(family_folder):
+    file = family_folder / 'meshes' / 'box.2.ply'
+    data = file.read_bytes()
+    file.write_bytes(data[:-1] + b'x')
+    _rejected(family_folder, 'box.2.ply is damaged')
+    file.unlink()
+    _rejected(family_folder, 'box.2.ply is missing')
+    file.write_bytes(data)
+    _edit(family_folder, lambda meta: meta['files'].pop('meshes/box.2.ply'))
+    _rejected(family_folder, 'does not list meshes/box.2.ply')
+
+
+def test_folders_from_before_there_were_families(folder, models):
+    def write(path):
+        arrays = dict(np.load(path))
+        assert arrays.pop('members').tolist() == [1, 1, 1]
+        assert not arrays.pop('built_in').any()
+        np.savez(path, **arrays)
+    _replace(folder, 'models.npz', write)
+    back = load_model_folder(folder)
+    for a, b in zip(models, back.models):
+        _same(a, b)
+    assert len(back.mesh_of('can')[1]) == 64
+
+
+@pytest.mark.parametrize('members', [
+    [3, 1], [1, 1], [0, 4], [-1, 5], [4], [1, 1, 2], [[1, 3]], [1.0, 3.0],
+    [1, 2 ** 62], [2 ** 62, 2 ** 62], [1, -2 ** 63 + 3]])
+def test_families_that_do_not_add_up(family_folder, members):
+    def write(path):
+        np.savez(path, **{**np.load(path), 'members': np.array(members)})
+    _replace(family_folder, 'models.npz', write)
+    if members == [3, 1]:
+        # Which category a mesh belongs to is for the trainer to know, but its file must be there.
+        _rejected(family_folder, 'does not list meshes/ball.1.ply')
+    else:
+        _rejected(family_folder, 'models.npz is not what hooc train writes')
+
+
+@pytest.mark.parametrize('names', [('can', 'can.1'), ('can.12', 'can'), ('Can', 'can.2')])
+def test_categories_do_not_take_the_files_of_members(tmp_path, models, names):
+    taken = [replace(model, name=name) for model, name in zip(models, names)]
+    with pytest.raises(HoocError, match='share a file') as error:
+        save_model_folder(tmp_path / 'm', 'x', taken, CLASSIFIER, 'fast', 0, ())
+    assert all(repr(name) in str(error.value) for name in names)
+    check_place(tmp_path / 'm', ['can.1', 'can.x', 'tin', 'tin.1a', '1.2'])
+
+
 def test_there_and_back(saved, models):
     back = load_model_folder(saved)
     assert (back.name, back.profile, back.seed, back.max_instances) == ('kitchen', 'fast', 7, 1)
     assert [m.name for m in back.models] == ['box', 'ball', 'can']
     for a, b in zip(models, back.models):
-        for key in vars(a):
-            np.testing.assert_array_equal(getattr(a, key), getattr(b, key))
-            assert np.asarray(getattr(a, key)).dtype == np.asarray(getattr(b, key)).dtype
+        _same(a, b)
     assert list(back.classifier) == list(CLASSIFIER)
     for key, array in CLASSIFIER.items():
         assert type(back.classifier[key]) is np.ndarray
@@ -159,7 +254,6 @@ def test_paths_out_of_the_folder(folder, tmp_path):
 
 def _replace(folder, file, write):
     """Write a file anew and enter its true size and checksum into model.json."""
-    import hashlib
     write(folder / file)
     data = (folder / file).read_bytes()
     _edit(folder, lambda meta: meta['files'].update(

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc train` from meshes to a MODEL folder that classifies, with tiny settings."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hooc_perception.cli import main
 from hooc_perception.core.classification.classify import classify
@@ -49,6 +49,7 @@ class MeshCategory:
     name: str
     mesh_path: object
     scale: float = 1.0
+    variant_paths: tuple = ()
 
 
 @pytest.fixture(scope='module')
@@ -111,6 +112,20 @@ def test_rows_favour_small_classes():
     y = np.repeat([0, 1, 2], [10000, 100, 4])
     rows = draw_rows(y, np.random.default_rng(0), 2.0)
     assert (np.bincount(y[rows]) == [200, 20, 4]).all() and (np.diff(rows) > 0).all()
+
+
+def test_every_mesh_of_a_category_is_derived(mesh_set):
+    can, plate, box = mesh_set.categories
+    alone = module.generic_models(mesh_set, 3)
+    bins = replace(box, variant_paths=(can.mesh_path, plate.mesh_path), scale=0.5)
+    models = module.generic_models(replace(mesh_set, categories=(can, bins)), 3)
+    assert [[m.name for m in model.members] for model in models] == [['can'], ['box'] * 3]
+    assert not any(m.built_in for m in models[1].members)
+    for member, extents in zip(models[1].members, (
+            (0.07, 0.15, 0.2), (0.07, 0.07, 0.12), (0.22, 0.22, 0.02))):
+        np.testing.assert_allclose(member.extents, np.array(extents) / 2, rtol=0.01)
+    # A variant changes nothing about the generic models.
+    np.testing.assert_array_equal(models[0].surface_points, alone[0].surface_points)
 
 
 def test_bad_input_is_named(mesh_set, tmp_path):

@@ -105,8 +105,8 @@ class OverlapTerm:
         size = np.maximum(objects.size.astype(np.float64), 1e-9)
         pairs = _meeting_pairs(R, objects.translation, size)
         bits = np.zeros((len(pairs), count // 64), np.uint64)
-        kernels.sample_bits(pairs, row.reshape(-1).astype(np.int32), R, objects.translation, size, samples,
-                            grids, bits)
+        kernels.sample_bits(pairs, row.reshape(-1).astype(np.int32), R, objects.translation, size,
+                            samples, grids, bits)
         # Keep pairs with a common volume, both directions, ordered by the first.
         mirror = np.lexsort((pairs[:, 0], pairs[:, 1]))
         kept = bits.any(1) | bits[mirror].any(1)

@@ -38,8 +38,8 @@ class ParseConfig(Config):
     polish_steps: int = param(20, 'Refinement steps of a chosen object.', low=0)
     turn_steps: int = param(10, 'Refinement steps of a chosen object after half a turn about each '
                             'of its axes; 0 = no such turns.', low=0)
-    member_steps: int = param(6, 'Refinement steps of a chosen object after its mesh was exchanged '
-                              'for another one of its family; 0 = no exchange.', low=0)
+    member_steps: int = param(6, 'Refinement steps of a chosen object after its mesh was '
+                              'exchanged for another one of its family; 0 = no exchange.', low=0)
     deadline_s: float = param(0.0, 'Seconds after which the best subset so far is the result; 0 '
                               '= none.', 's', 0.0, 3600.0, runtime=True)
     search: LocalSearchConfig = group(LocalSearchConfig(patience=8))

@@ -44,7 +44,8 @@ class Tracker:
     Give the objects of successive results lasting ids and steady orientations.
 
     Objects of one category are matched so that the sum of their motions is least; rotations that
-    leave a symmetric model as it is count nothing. An object whose category changes gets a new id.
+    leave a symmetric model as it is count nothing. An object whose category changes gets a new id;
+    one that is found with another mesh of its family keeps it.
 
     :param models: tuple of GenericModel; class id c is models[c - 1].
     """
@@ -97,10 +98,10 @@ class Tracker:
             known = [n for n, track in self._tracks.items() if track.category == category]
             if not known:
                 continue
-            model = self.models[int(category) - 1]
+            shapes = objects.take(rows).shapes(self.models)
             cost = np.zeros((len(rows), len(known)))
             far = np.zeros(cost.shape, bool)
-            for i, row in enumerate(rows):
+            for i, (row, model) in enumerate(zip(rows, shapes)):
                 for j, number in enumerate(known):
                     track = self._tracks[number]
                     way = np.linalg.norm(objects.translation[row] - track.translation)

@@ -11,7 +11,7 @@ from hooc_perception.core.arrays import AnyArray
 from hooc_perception.core.types import ObservedView
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.errors import world_mesh
-from hooc_perception.evaluation.matching import PosedObject
+from hooc_perception.evaluation.matching import PosedObject, shape_of
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.page import palette_of
 from hooc_perception.evaluation.report.scene import ReportScene, ShownScene
@@ -100,7 +100,7 @@ def _log_scene(rr: Any, recording: Any, scene: ReportScene, palette: pictures.Pa
     for i, thing in enumerate(scene.truth or ()):
         if thing.category in scene.models:
             _log_mesh(recording, f'world/truth/{thing.category}/{i}', thing,
-                      world_mesh(thing, scene.models[thing.category]), (255, 255, 255))
+                      world_mesh(thing, shape_of(thing, scene.models)), (255, 255, 255))
 
 
 def _log_camera(rr: Any, recording: Any, view: ObservedView) -> None:

@@ -19,7 +19,7 @@ from hooc_perception.core.types import (
     RectifiedView,
 )
 from hooc_perception.evaluation.errors import world_mesh
-from hooc_perception.evaluation.matching import candidate_objects, posed, PosedObject
+from hooc_perception.evaluation.matching import candidate_objects, posed, PosedObject, shape_of
 from hooc_perception.evaluation.scores import ObjectScore, score_objects
 
 # Rejected candidates are distinguished from chosen ones by their position.
@@ -100,7 +100,7 @@ class ShownScene:
         """Return a scene with its meshes."""
         drawn = [o for o in scene.objects if o.category in scene.models]
         true = [o for o in scene.truth or () if o.category in scene.models]
-        meshes, true_meshes = ([world_mesh(o, scene.models[o.category]) for o in objects]
+        meshes, true_meshes = ([world_mesh(o, shape_of(o, scene.models)) for o in objects]
                                for objects in (drawn, true))
         return ShownScene(scene, drawn, meshes, true, true_meshes)
 

@@ -12,7 +12,7 @@ from hooc_perception.core.geometry import back_project
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import GenericModel, Observation
 from hooc_perception.evaluation.errors import affine
-from hooc_perception.evaluation.matching import PosedObject
+from hooc_perception.evaluation.matching import member_of, PosedObject, shape_of
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.pictures import Palette, RGB
 from hooc_perception.evaluation.report.scene import ShownScene
@@ -26,21 +26,22 @@ TABLE_RGB, UNEXPLAINED_RGB = (150, 154, 160), (255, 60, 60)
 
 
 class Meshes:
-    """The generic meshes of a page, each stored once however often it is used."""
+    """The meshes of a page, each stored once however often it is used."""
 
     def __init__(self) -> None:
         self._known: dict[str, dict[str, Any]] = {}
 
-    def use(self, model: GenericModel) -> str:
-        """Store the mesh of a GenericModel; return its name on the page."""
-        if model.name not in self._known:
+    def use(self, model: GenericModel, member: int = 0) -> str:
+        """Store a mesh and its place in its family; return its name on the page."""
+        name = f'{model.name}/{member}' if member else model.name
+        if name not in self._known:
             unit = model.vertices / np.maximum(model.extents, 1e-9) + 0.5
             wide = len(unit) > 65535
-            self._known[model.name] = {
+            self._known[name] = {
                 'v': packed(np.round(65535 * unit.clip(0, 1)), np.uint16),
                 'f': packed(model.faces, np.uint32 if wide else np.uint16), 'wide': wide,
                 'extents': [float(x) for x in model.extents]}
-        return model.name
+        return name
 
     def json(self) -> str:
         """Return all meshes as JSON for a script element."""
@@ -70,9 +71,9 @@ def space_json(shown: ShownScene, rows: Sequence[Mapping[str, Any]], palette: Pa
     colours = pictures.instance_colours(shown.drawn, palette)
     facts = {row['k']: facts_of(row) for row in rows}
     objects = [{'name': o.category, 'colour': [int(c) for c in colours[k]],
-                'facts': facts.get(k, [])} | placed(o, models[o.category], store)
+                'facts': facts.get(k, [])} | placed(o, models, store)
                for k, o in enumerate(shown.drawn)]
-    truth = [{'name': o.category} | placed(o, models[o.category], store) for o in shown.true]
+    truth = [{'name': o.category} | placed(o, models, store) for o in shown.true]
     cloud, target = cloud_of(observation, shown.meshes, colours)
     eye = observation.views[0].camera.T_world_camera[:3, 3] - target
     return script_json({'objects': objects, 'truth': truth, 'cloud': cloud,
@@ -80,10 +81,13 @@ def space_json(shown: ShownScene, rows: Sequence[Mapping[str, Any]], palette: Pa
                         'azimuth': float(np.arctan2(eye[1], eye[0]))})
 
 
-def placed(thing: PosedObject, model: GenericModel, store: Meshes) -> dict[str, Any]:
+def placed(thing: PosedObject, models: Mapping[str, GenericModel],
+           store: Meshes) -> dict[str, Any]:
     """Return the mesh of an object and its pose: the columns of A, then t, metres."""
+    model = shape_of(thing, models)
     A, t = affine(thing, model)
-    return {'mesh': store.use(model), 'at': [float(x) for x in (*A.T.ravel(), *t)]}
+    return {'mesh': store.use(model, member_of(thing, models)),
+            'at': [float(x) for x in (*A.T.ravel(), *t)]}
 
 
 def seen_points(observation: Observation, meshes: Sequence[tuple[AnyArray, AnyArray]],

@@ -51,6 +51,7 @@ def parsed_entry(parsed: ParsedScene, category_names: Sequence[str]) -> dict[str
     for i in range(len(found)):
         objects.append({
             'category': category_names[int(found.category[i]) - 1],
+            'member': int(found.member[i]),
             'score': _finite(found.score[i]),
             'translation': np.asarray(found.translation[i], np.float64).tolist(),
             'rotation_xyzw': np.asarray(found.rotation_xyzw[i], np.float64).tolist(),
@@ -146,6 +147,8 @@ def _check_object(item: object, where: str) -> None:
     """Check one object's entry; `where` names file, scene and row."""
     item = fields.mapping(item, where)
     fields.text(fields.required(item, 'category', where), f'{where} category')
+    if item.get('member') is not None:
+        fields.integer(item['member'], 0, 65535, f'{where} member')
     if item.get('score') is not None:
         fields.number(item['score'], f'{where} score')
     fields.numbers(fields.required(item, 'translation', where), 3, f'{where} translation')

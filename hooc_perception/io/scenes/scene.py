@@ -15,15 +15,17 @@ from hooc_perception.io.scenes.table_frame import TableFrameScene
 @dataclass(frozen=True)
 class Category:
     """
-    A class of objects and its generic model.
+    A class of objects and its meshes.
 
-    :ivar mesh_path: the mesh file, of any format that trimesh reads.
-    :ivar scale: metres per unit of the mesh.
+    :ivar mesh_path: the file of the generic mesh, of any format that trimesh reads.
+    :ivar scale: metres per unit of the meshes.
+    :ivar variant_paths: files of further meshes of the category, in the same axes.
     """
 
     name: str
     mesh_path: Path
     scale: float = 1.0
+    variant_paths: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

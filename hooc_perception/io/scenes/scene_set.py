@@ -19,6 +19,8 @@ from hooc_perception.io.scenes.writer import FORMAT, NewScene, write_scene_set
 
 # Class ids and instance labels travel as 8-bit images in which 0 is the background.
 MAX_CATEGORIES = 255
+# Meshes of one category.
+MAX_MESHES = 100
 # The world_frame of sets whose poses are not in a table's frame.
 UNKNOWN_WORLD = 'unknown'
 
@@ -144,14 +146,33 @@ def _categories(path: Path, file: Path, entry: dict[str, Any]) -> tuple[Category
         item = fields.mapping(item, where)
         name = fields.name(fields.required(item, 'name', f'{where}:'), f'{where} name')
         where = f'{file}: category {name}:'
-        mesh = files.file_inside(path, fields.required(item, 'model', where), f'{where} model')
+        mesh, *more = _meshes(path, item, where)
         scale = fields.number(item.get('scale', 1.0), f'{where} scale')
         if scale <= 0:
             raise HoocError(f'{where} scale is {scale:g}; give the metres of one model unit')
-        result.append(Category(name, mesh, scale))
+        result.append(Category(name, mesh, scale, tuple(more)))
     check_categories(fields.unique([category.name for category in result], f'{file}: categories'),
                      str(file))
     return tuple(result)
+
+
+def _meshes(path: Path, item: dict[str, Any], where: str) -> list[Path]:
+    """Return the mesh files of a category, the generic one first."""
+    if 'models' not in item:
+        if 'model' not in item:
+            raise HoocError(f'{where} model is missing; add it, or models for several meshes')
+        return [files.file_inside(path, item['model'], f'{where} model')]
+    if 'model' in item:
+        raise HoocError(f'{where} has both model and models; keep one of them')
+    names = fields.sequence(item['models'], f'{where} models')
+    if not 1 <= len(names) <= MAX_MESHES:
+        raise HoocError(f'{where} models has {len(names)} entries; give 1 to {MAX_MESHES} meshes')
+    meshes = [files.file_inside(path, name, f'{where} models') for name in names]
+    fields.unique(names, f'{where} models')
+    if len({mesh.resolve() for mesh in meshes}) < len(meshes):
+        raise HoocError(f'{where} models names the same file twice '
+                        f'({fields.short_repr(names)}); remove one of them')
+    return meshes
 
 
 def _scene_folders(path: Path, needed: bool) -> list[Path]:

@@ -25,12 +25,15 @@ from std_msgs.msg import Header
 PIXEL_COLUMNS = (('camera', 'u1'), ('u', 'u2'), ('v', 'u2'), ('x', 'f4'), ('y', 'f4'),
                  ('z', 'f4'))
 CANDIDATE_COLUMNS = (('x', 'f4'), ('y', 'f4'), ('z', 'f4'), ('score', 'f4'), ('size_x', 'f4'),
-                     ('size_y', 'f4'), ('size_z', 'f4'), ('category', 'u2'))
+                     ('size_y', 'f4'), ('size_z', 'f4'), ('category', 'u2'), ('member', 'u2'))
 OBJECT_COLUMNS = tuple((name, 'f4') for name in (
     'x', 'y', 'z', 'qx', 'qy', 'qz', 'qw', 'score', 'size_x', 'size_y', 'size_z',
     'visible_ratio', 'residual_m', 'energy_delta', 'sigma_t', 'sigma_r', 'age_s')) + (
-        ('id', 'u4'), ('category', 'u2'), ('n_views', 'u1'), ('flags', 'u1'))
+        ('id', 'u4'), ('category', 'u2'), ('n_views', 'u1'), ('flags', 'u1'), ('member', 'u2'))
 SIZE = ('size_x', 'size_y', 'size_z')
+
+# (URI, sha256 in hex) of each member of a category's family.
+Meshes = Sequence[tuple[str, str]]
 
 # Bits of `flags`.
 FLAG_SEARCH_STOPPED = 1     # a deadline ended the search before it converged
@@ -107,6 +110,7 @@ def candidates_messages(candidates: Candidates, head: Header) -> tuple[PoseArray
     rows = np.zeros(len(candidates), row_dtype(CANDIDATE_COLUMNS))
     rows['x'], rows['y'], rows['z'] = candidates.translation.T
     rows['score'], rows['category'] = candidates.score, candidates.category
+    rows['member'] = candidates.member
     for axis, name in enumerate(SIZE):
         rows[name] = candidates.size[:, axis]
     return (pose_array_message(candidates.translation, candidates.rotation_xyzw, head),
@@ -114,31 +118,39 @@ def candidates_messages(candidates: Candidates, head: Header) -> tuple[PoseArray
 
 
 def candidates_from_messages(poses: PoseArray, attributes: PointCloud2,
-                             n_models: int | None = None) -> Candidates:
+                             families: Sequence[int] | None = None) -> Candidates:
     """
     Return the Candidates of their two messages, exactly as they were sent.
 
-    Objects have the same columns and more, so this also reads `objects/*`.
+    Objects have the same columns and more, so this also reads `objects/*`. Messages without the
+    column `member` are of the generic meshes.
 
-    :param n_models: the number of categories; compiled code relies on valid class ids.
+    :param families: the number of meshes of each category; compiled code relies on valid ids.
     :raises HoocError: if the messages do not belong together, or hold invalid candidates.
     """
     translation, rotation = poses_from_message(poses)
-    rows = cloud_rows(attributes, [name for name, _ in CANDIDATE_COLUMNS])
+    rows = cloud_rows(attributes, [name for name, _ in CANDIDATE_COLUMNS if name != 'member'])
     if len(rows) != len(translation) or attributes.header.stamp != poses.header.stamp:
         raise HoocError(f'{len(translation)} poses came with {len(rows)} rows of attributes; two '
                         'nodes publish on the same topics: stop one of them')
     category, size = rows['category'], np.stack([rows[name] for name in SIZE], -1)
-    if n_models is not None and len(rows):
-        if category.min() < 1 or category.max() > n_models:
+    known = 'member' in (rows.dtype.names or ())
+    member = rows['member'] if known else np.zeros(len(rows), np.uint16)
+    if families is not None and len(rows):
+        n_models = len(families)
+        if not (category.min() >= 1 and category.max() <= n_models):
             raise HoocError(f'candidates have a category outside of the {n_models} of the model; '
                             'set the parameter model to the same folder in all nodes')
+        most = np.asarray(families)[category.astype(np.int64) - 1]
+        if not ((member >= 0) & (member < most)).all():
+            raise HoocError("candidates have a member outside of their category's family in the "
+                            'model; set the parameter model to the same folder in all nodes')
         if not (np.isfinite(translation).all() and np.isfinite(size).all() and (size > 0).all()
                 and (np.abs(np.linalg.norm(rotation, axis=1) - 1) < 1e-3).all()):
             raise HoocError('candidates have invalid poses or sizes; check whether another node '
                             'publishes on their topics')
     return Candidates(category.astype(np.uint16), translation, rotation, size.astype(np.float32),
-                      rows['score'].astype(np.float32))
+                      rows['score'].astype(np.float32), member.astype(np.uint16))
 
 
 def objects_messages(parsed: ParsedScene, ids: Sequence[int] | AnyArray, age_s: float,
@@ -157,6 +169,7 @@ def objects_messages(parsed: ParsedScene, ids: Sequence[int] | AnyArray, age_s: 
     for axis, name in enumerate(SIZE):
         rows[name] = objects.size[:, axis]
     rows['score'], rows['category'], rows['id'] = objects.score, objects.category, ids
+    rows['member'] = objects.member
     rows['visible_ratio'], rows['residual_m'] = parsed.visible_ratio, parsed.residual_m
     rows['energy_delta'], rows['n_views'] = parsed.energy_delta, parsed.n_views
     # NaN where it was not estimated: a zero would claim perfection.
@@ -182,20 +195,26 @@ def points_message(points: AnyArray, head: Header, camera: AnyArray | None = Non
     return cloud_message(rows, head)
 
 
-def labels_json(models: Sequence[GenericModel], meshes: Sequence[tuple[str, str]],
-                ids: Iterable[int] = (), categories: Iterable[int] = ()) -> str:
+def labels_json(models: Sequence[GenericModel], meshes: Sequence[Meshes],
+                ids: Iterable[int] = (), objects: Candidates = Candidates.empty()) -> str:
     """
     Return the text of `objects/labels`, the meaning of class ids and instance ids.
 
     :param models: class id c is models[c - 1].
-    :param meshes: one (URI, sha256 in hex) per model.
+    :param meshes: Meshes of each.
     :param ids: instance ids of the latest objects.
-    :param categories: their class ids.
+    :param objects: these objects.
     """
-    classes = {str(c): {'name': model.name, 'mesh': uri, 'sha256': digest,
-                        'extents_m': [round(float(x), 6) for x in model.extents],
-                        'symmetry': [int(order) for order in model.symmetry]}
-               for c, (model, (uri, digest)) in enumerate(zip(models, meshes), 1)}
-    objects = {str(int(i)): {'category': models[int(c) - 1].name, 'class_id': int(c)}
-               for i, c in zip(ids, categories)}
-    return json.dumps({'format': 'hooc-labels/1', 'classes': classes, 'objects': objects})
+    classes = {}
+    for c, (model, family) in enumerate(zip(models, meshes), 1):
+        members = [{'mesh': uri, 'sha256': digest,
+                    'extents_m': [round(float(x), 6) for x in shape.extents],
+                    'symmetry': [int(order) for order in shape.symmetry]}
+                   for shape, (uri, digest) in zip(model.members, family)]
+        classes[str(c)] = {'name': model.name, **members[0], 'members': members}
+    found = {}
+    for i, c, member in zip(ids, objects.category.tolist(), objects.member.tolist()):
+        uri, digest = meshes[c - 1][member]
+        found[str(int(i))] = {'category': models[c - 1].name, 'class_id': c, 'member': member,
+                              'mesh': uri, 'sha256': digest}
+    return json.dumps({'format': 'hooc-labels/1', 'classes': classes, 'objects': found})

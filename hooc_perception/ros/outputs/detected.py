@@ -25,7 +25,7 @@ class DetectedObject:
     :ivar size: (3,) float64 extents along the axes of the model, metres.
     :ivar sigma_t: metres within which 68 % of the errors lie, NaN = not estimated.
     :ivar sigma_r: the same for the rotation, radians.
-    :ivar model: the GenericModel of its category.
+    :ivar model: the mesh of its category's family that was found.
     """
 
     id: int
@@ -78,5 +78,5 @@ def detected_scene(parsed: ParsedScene, ids: AnyArray, models: Sequence[GenericM
         DetectedObject(int(ids[i]), int(found.category[i]), float(found.score[i]),
                        found.translation[i], found.rotation_xyzw[i],
                        found.size[i].astype(float), float(sigma_t[i]), float(sigma_r[i]),
-                       models[int(found.category[i]) - 1])
-        for i in range(len(found))))
+                       model)
+        for i, model in enumerate(found.shapes(models))))

@@ -15,6 +15,7 @@ from hooc_perception.ros.messages.conversions import header, pose_array_message
 from hooc_perception.ros.messages.point_clouds import cloud_message, row_dtype
 from hooc_perception.ros.messages.stages import (
     labels_json,
+    Meshes,
     OBJECT_COLUMNS,
     objects_messages,
     points_message,
@@ -30,11 +31,11 @@ class ObjectOutput:
     Publish results.
 
     :param models: class id c is models[c - 1].
-    :param meshes: one (URI, sha256 in hex) per model.
+    :param meshes: (URI, sha256 in hex) of each member of their families.
     """
 
     def __init__(self, node: StageNode, models: Sequence[GenericModel],
-                 meshes: Sequence[tuple[str, str]]) -> None:
+                 meshes: Sequence[Meshes]) -> None:
         """Create the publishers."""
         self.models, self.meshes = models, meshes
         self._shown: set[tuple[str, int]] = set()   # (ns, id) of the markers in viewers
@@ -63,8 +64,7 @@ class ObjectOutput:
         """
         head, found = header(stamp_ns, frame), parsed.objects
         poses, attributes = objects_messages(parsed, ids, age_s, head)
-        self._labels.publish(String(data=labels_json(self.models, self.meshes, ids,
-                                                     found.category)))
+        self._labels.publish(String(data=labels_json(self.models, self.meshes, ids, found)))
         self._attributes.publish(attributes)
         for class_id, publisher in enumerate(self._by_category, 1):
             mine = found.take(found.category == class_id)
@@ -99,12 +99,11 @@ class ObjectOutput:
         """Return DELETE for the markers of objects that are gone, ADD for the current ones."""
         markers = self._deleted({(self.models[c - 1].name, int(number))
                                  for c, number in zip(found.category, ids)}, head)
-        for i, number in enumerate(ids):
-            class_id = int(found.category[i])
-            model = self.models[class_id - 1]
+        for i, (number, model) in enumerate(zip(ids, found.shapes(self.models))):
+            class_id, member = int(found.category[i]), int(found.member[i])
             marker = Marker(header=head, ns=model.name, id=int(number), action=Marker.ADD,
                             type=Marker.MESH_RESOURCE, pose=poses[i],
-                            mesh_resource=self.meshes[class_id - 1][0])
+                            mesh_resource=self.meshes[class_id - 1][member][0])
             scale = found.size[i] / model.extents
             marker.scale.x, marker.scale.y, marker.scale.z = (float(s) for s in scale)
             hue = class_id * 0.618034 % 1.0     # golden ratio: adjacent ids differ

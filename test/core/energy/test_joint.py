@@ -18,8 +18,8 @@ CONFIG = ObjectCosts()
 
 def energy_of_pool(desk, pool, config=CONFIG, max_instances=0):
     """Return (JointEnergy over all pixels, stats, lists, evidence)."""
-    evidence = desk.frame.evidence
-    stats, lists = evidence.compare_pixels(hypotheses_of(pool, desk.models), pool.category,
+    evidence, shapes = desk.frame.evidence, desk.frame.shapes
+    stats, lists = evidence.compare_pixels(hypotheses_of(pool, shapes), shapes.of(pool),
                                            PixelCosts().weights())
     return (JointEnergy(evidence, pool, stats, lists, desk.models, config, max_instances), stats,
             lists, evidence)

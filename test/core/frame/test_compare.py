@@ -25,7 +25,7 @@ def scene(desk):
     """Return the desk, its full Evidence, and 18 hypotheses: true, near, far, of other classes."""
     evidence = desk.frame.evidence
     rng, rows, category = np.random.default_rng(4), [], []
-    true = hypotheses_of(desk.truth, desk.models)
+    true = hypotheses_of(desk.truth, desk.frame.shapes)
     for k in range(18):
         h, spread = true[k % 3].copy(), (0, 0.004, 0.015, 0.05)[k // 3 % 4]
         h[:3] += rng.normal(0, spread, 3)
@@ -34,8 +34,10 @@ def scene(desk):
         h[7:10] *= np.exp(rng.normal(0, 3 * spread, 3))
         rows.append(h)
         category.append(k % 3 + 1 if k < 12 else (k + 1) % 3 + 1)
-    return SimpleNamespace(desk=desk, evidence=evidence, H=np.array(rows),
-                           category=np.array(category), true=true)
+    category = np.array(category)
+    # Every family has one member.
+    return SimpleNamespace(desk=desk, evidence=evidence, H=np.array(rows), category=category,
+                           shape=category - 1, true=true)
 
 
 def mesh_of(scene, h, c):
@@ -126,7 +128,7 @@ NAMES = ('SHOWN', 'AGREE', 'GAIN', 'VIOLATE', 'BEHIND', 'MISSING', 'SHARE', 'UNL
 
 def agree_with_plain(scene, rows, context, me):
     """Compare statistics and pixel lists of some rows with those of plain Python."""
-    stats, lists = scene.evidence.compare_pixels(scene.H[rows], scene.category[rows], WEIGHTS,
+    stats, lists = scene.evidence.compare_pixels(scene.H[rows], scene.shape[rows], WEIGHTS,
                                                  context, me=me)
     for k, row in enumerate(rows):
         expected, entries = plain(scene, scene.H[row], scene.category[row], context, me[k])
@@ -149,7 +151,7 @@ def test_statistics_and_pixel_lists_are_those_of_plain_python(scene):
 
 
 def test_statistics_among_others_that_are_shown_already(scene):
-    _, lists = scene.evidence.compare_pixels(scene.H[:6], scene.category[:6], WEIGHTS)
+    _, lists = scene.evidence.compare_pixels(scene.H[:6], scene.shape[:6], WEIGHTS)
     context = scene.evidence.compose([0, 2, 4], lists)
     stats = agree_with_plain(scene, [0, 3, 4, 5, 7], context, [0, -1, 4, -1, 0])
     assert stats[1, kernel.BEHIND] > 100, 'a copy of what is shown hides nothing'
@@ -181,15 +183,15 @@ def test_pixel_costs():
 def test_the_category_counts(scene):
     ball_there = scene.true[2].copy()
     ball_there[7:10] = scene.desk.models[2].extents / scene.desk.models[1].extents
-    can, ball = scene.evidence.compare(np.array([scene.true[2], ball_there]), [3, 2], WEIGHTS)
+    can, ball = scene.evidence.compare(np.array([scene.true[2], ball_there]), [2, 1], WEIGHTS)
     assert can[kernel.UNLIKELINESS] < 0.1 * can[kernel.AGREE]
     assert ball[kernel.UNLIKELINESS] > 0.7 * ball[kernel.AGREE] > 100
-    blind = scene.evidence.compare(ball_there[None], [2], PixelWeights(category=0.0))[0]
+    blind = scene.evidence.compare(ball_there[None], [1], PixelWeights(category=0.0))[0]
     assert blind[kernel.GAIN] > ball[kernel.GAIN] + 0.2 * ball[kernel.AGREE]
 
 
 def test_the_true_objects_explain_what_they_cover(scene):
-    stats = scene.evidence.compare(scene.true, [1, 2, 3], WEIGHTS)
+    stats = scene.evidence.compare(scene.true, [0, 1, 2], WEIGHTS)
     covered = stats[:, kernel.SHOWN] - stats[:, kernel.BEHIND] - stats[:, kernel.MISSING]
     assert (stats[:, kernel.AGREE] > 0.9 * covered).all()
     assert (stats[:, kernel.VIEWS] == 3).all()
@@ -197,17 +199,17 @@ def test_the_true_objects_explain_what_they_cover(scene):
     assert (stats[:, kernel.RESIDUAL] / stats[:, kernel.AGREE] < 0.003).all()
     moved = scene.true.copy()
     moved[:, 0] += 0.05
-    assert (scene.evidence.compare(moved, [1, 2, 3], WEIGHTS)[:, kernel.DELTA]
+    assert (scene.evidence.compare(moved, [0, 1, 2], WEIGHTS)[:, kernel.DELTA]
             > stats[:, kernel.DELTA] + 100).all()
 
 
 def test_delta_is_the_change_of_the_composed_cost(scene):
-    _, lists = scene.evidence.compare_pixels(scene.H, scene.category, WEIGHTS)
+    _, lists = scene.evidence.compare_pixels(scene.H, scene.shape, WEIGHTS)
     for others, new in (([], 0), ([0, 1], 2), ([3, 7], 4), ([0, 4, 8, 11], 5)):
         before, after = (scene.evidence.compose(m, lists) for m in (others, [*others, new]))
         rise = after[2].astype(float).sum() - before[2].astype(float).sum()
         for context, me in ((before, -1), (after, new)):
-            stats = scene.evidence.compare(scene.H[[new]], scene.category[[new]], WEIGHTS,
+            stats = scene.evidence.compare(scene.H[[new]], scene.shape[[new]], WEIGHTS,
                                            context, me=[me])
             assert stats[0, kernel.DELTA] == pytest.approx(rise, abs=0.02)
 
@@ -240,17 +242,17 @@ def settings(steps):
 
 def objective(scene, H, context, me, complexity, prior):
     """Return what refinement lowers."""
-    stats = scene.evidence.compare(H, scene.category, WEIGHTS, context, me=me)
+    stats = scene.evidence.compare(H, scene.shape, WEIGHTS, context, me=me)
     return stats[:, kernel.DELTA] + stats[:, kernel.SHOWN] * (
         complexity + prior * (np.log(H[:, 7:10]) ** 2).sum(1))
 
 
 @pytest.mark.parametrize('members', [[], [0, 1, 2], [3, 8]])
 def test_refinement_never_makes_its_objective_worse(scene, members):
-    _, lists = scene.evidence.compare_pixels(scene.H, scene.category, WEIGHTS)
+    _, lists = scene.evidence.compare_pixels(scene.H, scene.shape, WEIGHTS)
     context = scene.evidence.compose(members, lists)
     me = np.where(np.isin(np.arange(len(scene.H)), members), np.arange(len(scene.H)), -1)
-    H = scene.evidence.refine(scene.H, scene.category, WEIGHTS, settings(25),
+    H = scene.evidence.refine(scene.H, scene.shape, WEIGHTS, settings(25),
                               np.random.default_rng(0), context, me)
     before, after = (objective(scene, h, context, me, 0.1, 0.05) for h in (scene.H, H))
     assert (after <= before + 1e-6).all()
@@ -262,7 +264,7 @@ def test_refinement_brings_a_shifted_object_back(scene):
     shifted = scene.true.copy()
     shifted[:, :2] += [[0.008, -0.006]]
     kept = shifted.copy()
-    H = scene.evidence.refine(shifted, np.array([1, 2, 3]), WEIGHTS, settings(80),
+    H = scene.evidence.refine(shifted, np.array([0, 1, 2]), WEIGHTS, settings(80),
                               np.random.default_rng(1))
     np.testing.assert_array_equal(shifted, kept)
     off = np.linalg.norm(H[:, :3] - scene.true[:, :3], axis=1)
@@ -274,8 +276,8 @@ def test_one_seed_one_result_whatever_the_threads(scene):
     try:
         for threads in (1, min(2, numba.config.NUMBA_NUM_THREADS)):
             numba.set_num_threads(threads)
-            stats, lists = scene.evidence.compare_pixels(scene.H, scene.category, WEIGHTS)
-            H = scene.evidence.refine(scene.H, scene.category, WEIGHTS, settings(10),
+            stats, lists = scene.evidence.compare_pixels(scene.H, scene.shape, WEIGHTS)
+            H = scene.evidence.refine(scene.H, scene.shape, WEIGHTS, settings(10),
                                       np.random.default_rng(3), scene.evidence.nothing, [-1] * 18)
             results.append((stats, lists.offsets, lists.pixel, lists.cost, H))
     finally:

@@ -36,9 +36,9 @@ def test_views_are_laid_out_one_after_the_other(desk, space):
 
 
 def test_a_stride_looks_at_every_second_pixel_of_the_same_picture(desk, space):
-    H, category = hypotheses_of(desk.truth, desk.models), desk.truth.category
-    _, full = space.evidence.compare_pixels(H, category, WEIGHTS)
-    stats, half = space.coarse.compare_pixels(H, category, WEIGHTS)
+    H, shape = hypotheses_of(desk.truth, space.shapes), space.shapes.of(desk.truth)
+    _, full = space.evidence.compare_pixels(H, shape, WEIGHTS)
+    stats, half = space.coarse.compare_pixels(H, shape, WEIGHTS)
     for k in range(len(H)):
         shown = np.full(len(space.evidence.views.depth), np.inf, np.float32)
         mine = slice(*full.offsets[k:k + 2])
@@ -54,8 +54,8 @@ def test_a_stride_looks_at_every_second_pixel_of_the_same_picture(desk, space):
 
 
 def test_composed_pictures_are_those_of_the_renderer(desk, space):
-    H = hypotheses_of(desk.truth, desk.models)
-    _, lists = space.evidence.compare_pixels(H, desk.truth.category, WEIGHTS)
+    H = hypotheses_of(desk.truth, space.shapes)
+    _, lists = space.evidence.compare_pixels(H, space.shapes.of(desk.truth), WEIGHTS)
     owner, depth, *_ = space.evidence.compose([0, 1, 2], lists)
     drawn = [render_depth(desk.meshes, v.camera) for v in desk.observation.views]
     expected = np.concatenate([d.ravel() for d, _ in drawn])
@@ -85,22 +85,24 @@ def test_rows_of_pixel_lists_are_taken_and_joined():
     assert none.extended(lists).offsets.tolist() == lists.offsets.tolist()
 
 
-def test_hypotheses_and_candidates_are_the_same_things(desk):
-    H = hypotheses_of(desk.truth, desk.models)
+def test_hypotheses_and_candidates_are_the_same_things(desk, space):
+    H, shapes = hypotheses_of(desk.truth, space.shapes), space.shapes
     np.testing.assert_allclose(H[:, 7:10], 1, rtol=1e-6)
     H[:, 7:10] *= [[1.2, 0.8, 1.1]]
-    back = candidates_of(H, desk.truth.category.astype(np.int64), np.arange(3.0), desk.models)
+    back = candidates_of(H, shapes.of(desk.truth), np.arange(3.0), shapes)
     np.testing.assert_allclose(back.size, desk.truth.size * [[1.2, 0.8, 1.1]], rtol=1e-6)
-    np.testing.assert_allclose(hypotheses_of(back, desk.models), H, rtol=1e-6, atol=1e-12)
-    assert back.category.dtype == np.uint16 and back.size.dtype == np.float32
+    np.testing.assert_allclose(hypotheses_of(back, shapes), H, rtol=1e-6, atol=1e-12)
+    np.testing.assert_array_equal(back.category, desk.truth.category)
+    assert back.category.dtype == back.member.dtype == np.uint16
+    assert back.size.dtype == np.float32
     assert back.score.dtype == np.float32 and back.translation.dtype == np.float64
-    assert hypotheses_of(Candidates.empty(), desk.models).shape == (0, 10)
-    assert len(candidates_of(np.zeros((0, 11)), np.zeros(0, int), np.zeros(0), desk.models)) == 0
+    assert hypotheses_of(Candidates.empty(), shapes).shape == (0, 10)
+    assert len(candidates_of(np.zeros((0, 11)), np.zeros(0, int), np.zeros(0), shapes)) == 0
 
 
 def test_what_an_object_covers_is_no_longer_unexplained(desk, space):
-    H = hypotheses_of(desk.truth, desk.models)
-    _, lists = space.evidence.compare_pixels(H, desk.truth.category, WEIGHTS)
+    H = hypotheses_of(desk.truth, space.shapes)
+    _, lists = space.evidence.compare_pixels(H, space.shapes.of(desk.truth), WEIGHTS)
     alone = space.evidence.unexplained()
     np.testing.assert_array_equal(alone, 1)
     left = space.evidence.unexplained(space.evidence.compose([0, 2], lists))

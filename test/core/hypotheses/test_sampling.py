@@ -13,6 +13,7 @@ from hooc_perception.core.hypotheses.sampling import (
     SampleCounts,
     tables,
 )
+from hooc_perception.core.shapes import Shapes
 import numba
 import numpy as np
 import pytest
@@ -28,8 +29,10 @@ def space(desk):
 
 def drawn(space, desk, config, seed=0, steps=0, weight=None, samples=1500):
     """Return (H, category) of a small draw."""
-    return sample(space.cloud, space.field, desk.models, config, np.random.default_rng(seed),
-                  SampleCounts(samples, 30, steps), weight)
+    shapes = Shapes(desk.models)
+    H, shape = sample(space.cloud, space.field, shapes, config, np.random.default_rng(seed),
+                      SampleCounts(samples, 30, steps), weight)
+    return H, shapes.category[shape]
 
 
 def test_tables_hold_every_models_points_and_resting_poses(things):
@@ -146,28 +149,31 @@ def hypotheses(*rows):
 def test_near_copies_are_left_out_and_other_sizes_stay(things):
     H = hypotheses((0, 0, 1), (0.003, 0.05, 1.02), (0, 0, 1.5), (0, 1.6, 1), (0.1, 0, 1))
     score = np.array([0.5, 0.9, 0.4, 0.3, 0.2])
-    rows = non_maximum_suppression(H, np.ones(5, int), score, things, 10)
+    rows = non_maximum_suppression(H, np.zeros(5, int), score, Shapes(things), 10)
     assert rows.tolist() == [1, 2, 3, 4]
-    assert non_maximum_suppression(H, np.ones(5, int), score, things, 2).tolist() == [1, 2]
+    assert non_maximum_suppression(H, np.zeros(5, int), score, Shapes(things),
+                                   2).tolist() == [1, 2]
 
 
 def test_a_quaternion_and_its_negative_are_the_same_rotation(things):
     H = np.repeat(hypotheses((0, 0.4, 1)), 2, axis=0)
     H[1, 3:7] *= -1
-    rows = non_maximum_suppression(H, np.ones(2, int), np.array([0.1, 0.2]), things, 5)
+    rows = non_maximum_suppression(H, np.zeros(2, int), np.array([0.1, 0.2]), Shapes(things), 5)
     assert rows.tolist() == [1]
 
 
 def test_categories_do_not_compete(things):
     H = hypotheses(*[(0, 0, 1)] * 3)
-    rows = non_maximum_suppression(H, np.array([3, 1, 2]), np.array([0.1, 0.2, 0.3]), things, 1)
+    score, shapes = np.array([0.1, 0.2, 0.3]), Shapes(things)
+    rows = non_maximum_suppression(H, np.array([2, 0, 1]), score, shapes, 1)
     assert sorted(rows.tolist()) == [0, 1, 2]
-    assert non_maximum_suppression(H[:0], np.zeros(0, int), np.zeros(0), things, 3).tolist() == []
+    assert non_maximum_suppression(H[:0], np.zeros(0, int), np.zeros(0), shapes, 3).tolist() == []
 
 
 def test_none_wanted_none_given(things):
     H = hypotheses((0, 0, 1), (0.3, 0, 1))
-    assert non_maximum_suppression(H, np.ones(2, int), np.zeros(2), things, 0).tolist() == []
+    assert non_maximum_suppression(H, np.zeros(2, int), np.zeros(2), Shapes(things),
+                                   0).tolist() == []
 
 
 def test_what_is_left_out_is_what_a_plain_loop_leaves_out(things):
@@ -184,4 +190,4 @@ def test_what_is_left_out_is_what_a_plain_loop_leaves_out(things):
                 kept.append(i)
         expected += kept[:12]
     assert 8 < len(expected) < 25
-    assert non_maximum_suppression(H, category, score, things, 12).tolist() == expected
+    assert non_maximum_suppression(H, category - 1, score, Shapes(things), 12).tolist() == expected

@@ -53,8 +53,8 @@ def state(desk, desk_pool):
 def test_margins_are_what_one_exchange_leaves_to_gain(desk):
     pool = desk.truth.extended(desk.truth)
     pool.translation[3:] += [0.015, 0.0, 0.0]
-    evidence = desk.frame.coarse
-    stats, lists = evidence.compare_pixels(hypotheses_of(pool, desk.models), pool.category,
+    evidence, shapes = desk.frame.coarse, desk.frame.shapes
+    stats, lists = evidence.compare_pixels(hypotheses_of(pool, shapes), shapes.of(pool),
                                            PixelCosts().weights())
     energy = JointEnergy(evidence, pool, stats, lists, desk.models, ObjectCosts(), 1)
     start = np.array([True, True, False, False, False, False])

@@ -17,7 +17,7 @@ def parsed():
     objects = Candidates(np.array([2, 1], np.uint16), np.array([[0.1, 0.2, 0.3], [0, 0, 1.0]]),
                          np.array([[0, 0, 0, 1.0], [0.6, 0, 0, 0.8]]),
                          np.array([[0.1, 0.1, 0.2], [1, 2, 3]], np.float32),
-                         np.array([0.9, 0.5], np.float32))
+                         np.array([0.9, 0.5], np.float32), np.array([3, 0], np.uint16))
     return ParsedScene(objects, Energy(0.5, 0.75, 0.125), np.array([1, 0.5], np.float32),
                        np.array([0.002, np.nan], np.float32), np.array([0.1, 0.2], np.float32),
                        np.array([3, 1], np.uint8), objects, True, {'parse': 0.5})
@@ -36,6 +36,7 @@ def test_there_and_back(tmp_path, parsed):
                                'overlap': 0.125}
     first, second = scene['objects']
     assert (first['category'], second['category']) == ('box', 'ball')
+    assert (first['member'], second['member']) == (3, 0)
     assert first['translation'] == [0.1, 0.2, 0.3]
     assert second['rotation_xyzw'] == [0.6, 0, 0, 0.8]
     assert second['size'] == [1, 2, 3]
@@ -69,6 +70,8 @@ ERRORS = [
     (lambda r, s, o: s['energy'].update(total='low'), ('10_1', 'energy', 'total', 'low')),
     (lambda r, s, o: s.pop('objects'), ('10_1', 'objects', 'missing')),
     (lambda r, s, o: o.pop('category'), ('10_1', 'objects[0]', 'category')),
+    *((lambda r, s, o, bad=bad: o.update(member=bad), ('10_1', 'objects[0]', 'member', str(bad)))
+      for bad in (-1, 1.5, 'first', 10 ** 6)),
     (lambda r, s, o: o.update(score='good'), ('10_1', 'objects[0]', 'score', 'good')),
     (lambda r, s, o: o.update(translation=[0, 0]), ('10_1', 'objects[0]', 'translation')),
     (lambda r, s, o: o.update(rotation_xyzw=[0, 0, 0, 0]), ('10_1', 'rotation_xyzw', 'unit')),

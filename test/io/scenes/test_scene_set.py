@@ -81,6 +81,24 @@ def test_what_is_written_is_read_back(written):
             np.testing.assert_allclose(getattr(read, field), getattr(true, field), atol=1e-12)
 
 
+def test_a_category_may_have_several_meshes(written):
+    path, _, _ = written
+    file = path / 'dataset.yaml'
+    content = yaml.safe_load(file.read_text())
+    content['categories'] = [
+        {'name': 'ball', 'model': 'models/ball.ply'},
+        {'name': 'thing', 'models': ['models/box.ply', 'models/ball.ply'], 'scale': 0.5},
+        {'name': 'box', 'models': ['models/box.ply']}]
+    file.write_text(yaml.safe_dump(content))
+    (path / 'scenes' / 'a' / 'ground_truth.yaml').unlink()
+    ball, thing, box = load_scene_set(path).categories
+    models = path / 'models'
+    assert (ball.mesh_path, ball.variant_paths) == (models / 'ball.ply', ())
+    assert (box.mesh_path, box.variant_paths) == (models / 'box.ply', ())
+    assert (thing.mesh_path, thing.variant_paths, thing.scale) == (
+        models / 'box.ply', (models / 'ball.ply',), 0.5)
+
+
 def test_cameras_of_the_first_scene_serve_a_set_without_its_own(written):
     path, _, scenes = written
     (path / 'cameras.yaml').unlink()

@@ -50,6 +50,12 @@ def assert_sentence(error, *words):
         assert word in text
 
 
+def family(content, models):
+    """Give the second category of a dataset.yaml a list of meshes."""
+    content['categories'][1].pop('model')
+    content['categories'][1]['models'] = models
+
+
 DATASET = [
     (lambda d: d.update(format='hooc-scenes/2'), ('format', 'hooc-scenes/2', 'hooc-scenes/1')),
     (lambda d: d.pop('format'), ('format', 'missing')),
@@ -73,11 +79,24 @@ DATASET = [
     (lambda d: d['categories'].append(dict(d['categories'][0])), ('categories', 'ball', 'twice')),
     (lambda d: d['categories'][1].pop('name'), ('categories[1]', 'name')),
     (lambda d: d['categories'][1].update(name='a/b'), ('categories[1]', 'name', 'a/b')),
-    (lambda d: d['categories'][1].pop('model'), ('box', 'model', 'missing')),
+    (lambda d: d['categories'][1].pop('model'), ('box', 'model', 'missing', 'models')),
     (lambda d: d['categories'][1].update(model='models/none.ply'), ('box', 'model', 'none.ply')),
     (lambda d: d['categories'][1].update(model='../../etc/passwd'), ('box', 'model', 'leaves')),
     (lambda d: d['categories'][1].update(model='/etc/passwd'), ('box', 'model', 'leaves')),
     (lambda d: d['categories'][1].update(model=5), ('box', 'model', '5')),
+    (lambda d: d['categories'][1].update(models=['models/box.ply']),
+     ('box', 'both model and models', 'keep one')),
+    (lambda d: family(d, []), ('box', 'models', '0 entries')),
+    (lambda d: family(d, 'models/box.ply'), ('box', 'models', 'list')),
+    (lambda d: family(d, None), ('box', 'models', 'list')),
+    (lambda d: family(d, ['models/box.ply', 'models/none.ply']), ('box', 'models', 'none.ply')),
+    (lambda d: family(d, ['models/box.ply', 7]), ('box', 'models', '7')),
+    (lambda d: family(d, ['models/box.ply', '../../etc/passwd']), ('box', 'models', 'leaves')),
+    (lambda d: family(d, ['models/box.ply', 'models/ball.ply', 'models/box.ply']),
+     ('box', 'models', 'models/box.ply', 'twice')),
+    (lambda d: family(d, ['models/box.ply', 'models/../models/box.ply']),
+     ('box', 'models', 'box.ply', 'same file')),
+    (lambda d: family(d, ['models/box.ply'] * 101), ('box', 'models', '101 entries')),
     (lambda d: d['categories'][1].update(scale=0), ('box', 'scale')),
     (lambda d: d['categories'][1].update(scale=float('nan')), ('box', 'scale', 'nan')),
 ]

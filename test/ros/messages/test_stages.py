@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What travels between the stages arrives as it was sent, also read by foreign means."""
 
+from dataclasses import replace
 import json
 import struct
 
@@ -35,11 +36,12 @@ def some_candidates(n, seed=0, classes=3):
     q = rng.normal(size=(n, 4))
     return Candidates(rng.integers(1, classes + 1, n).astype(np.uint16), rng.normal(size=(n, 3)),
                       q / np.linalg.norm(q, axis=1, keepdims=True),
-                      rng.random((n, 3)).astype(np.float32), rng.random(n).astype(np.float32))
+                      rng.random((n, 3)).astype(np.float32), rng.random(n).astype(np.float32),
+                      rng.integers(0, 4, n).astype(np.uint16))
 
 
 def same(a, b):
-    for name in ('category', 'translation', 'rotation_xyzw', 'size', 'score'):
+    for name in ('category', 'translation', 'rotation_xyzw', 'size', 'score', 'member'):
         assert getattr(a, name).dtype == getattr(b, name).dtype, name
         assert getattr(a, name).tobytes() == getattr(b, name).tobytes(), name
 
@@ -74,6 +76,49 @@ def test_candidates_pass_unchanged(n):
     candidates = some_candidates(n)
     poses, attributes = s.candidates_messages(candidates, header(9, 'table'))
     same(s.candidates_from_messages(sent(poses), sent(attributes)), candidates)
+
+
+def without_members(attributes):
+    """Return a cloud of candidates as nodes wrote it before there were families."""
+    rows = cloud_rows(attributes)
+    older = np.zeros(len(rows), row_dtype(
+        [c for c in s.CANDIDATE_COLUMNS if c[0] != 'member']))
+    for name in older.dtype.names:
+        older[name] = rows[name]
+    return cloud_message(older, attributes.header)
+
+
+@pytest.mark.parametrize('n', [0, 5])
+def test_messages_without_members_are_of_the_generic_meshes(n):
+    candidates = some_candidates(n)
+    poses, attributes = s.candidates_messages(candidates, header(9, 'table'))
+    again = s.candidates_from_messages(sent(poses), sent(without_members(attributes)), [4, 1, 4])
+    same(again, replace(candidates, member=np.zeros(n, np.uint16)))
+
+
+def test_ids_outside_of_the_model_are_refused():
+    candidates = replace(some_candidates(4), category=np.array([1, 2, 3, 3], np.uint16),
+                         member=np.array([0, 1, 0, 2], np.uint16))
+    messages = s.candidates_messages(candidates, header(9, 'table'))
+    same(s.candidates_from_messages(*messages, [1, 2, 3]), candidates)
+    with pytest.raises(HoocError, match='category outside of the 2.*same folder in all nodes'):
+        s.candidates_from_messages(*messages, [1, 2])
+    for families in ([1, 1, 3], [1, 2, 2], [9, 9, 1]):
+        with pytest.raises(HoocError, match='member outside.*same folder in all nodes'):
+            s.candidates_from_messages(*messages, families)
+
+
+@pytest.mark.parametrize('column, value', [('member', np.nan), ('member', -1.0),
+                                           ('category', np.nan)])
+def test_ids_of_another_type_lead_nowhere_else(column, value):
+    poses, attributes = s.candidates_messages(some_candidates(2, classes=1), header(9, 'table'))
+    known = cloud_rows(attributes)
+    rows = np.zeros(2, row_dtype([(name, 'f4') for name, _ in s.CANDIDATE_COLUMNS]))
+    for name in rows.dtype.names:
+        rows[name] = known[name]
+    rows[column][1] = value
+    with pytest.raises(HoocError, match=column):
+        s.candidates_from_messages(poses, cloud_message(rows, attributes.header), [4])
 
 
 def test_rows_and_poses_that_do_not_belong_together():
@@ -131,8 +176,8 @@ def test_objects_have_exactly_the_promised_columns(n):
     poses, attributes = s.objects_messages(scene, range(7, 7 + n), 0.25, header(9, 'table'))
     poses, attributes = sent(poses), sent(attributes)
     names = ('x y z qx qy qz qw score size_x size_y size_z visible_ratio residual_m '
-             'energy_delta sigma_t sigma_r age_s id category n_views flags').split()
-    types = [7] * 17 + [6, 4, 2, 2]
+             'energy_delta sigma_t sigma_r age_s id category n_views flags member').split()
+    types = [7] * 17 + [6, 4, 2, 2, 4]
     assert [(f.name, f.datatype, f.count) for f in attributes.fields] == [
         (name, kind, 1) for name, kind in zip(names, types)]
     assert attributes.header == poses.header
@@ -141,6 +186,7 @@ def test_objects_have_exactly_the_promised_columns(n):
     for i in range(n):
         assert foreign_value(attributes, i, 'id') == 7 + i
         assert foreign_value(attributes, i, 'category') == scene.objects.category[i]
+        assert foreign_value(attributes, i, 'member') == scene.objects.member[i]
         assert foreign_value(attributes, i, 'energy_delta') == scene.energy_delta[i]
         assert foreign_value(attributes, i, 'n_views') == scene.n_views[i]
         assert foreign_value(attributes, i, 'age_s') == 0.25
@@ -180,12 +226,24 @@ def test_clouds_without_what_is_needed():
 
 def test_labels_name_classes_and_objects():
     class Model:
-        def __init__(self, name):
-            self.name, self.extents, self.symmetry = name, np.ones(3), np.array([1, 2, 0])
-    text = s.labels_json([Model('cup'), Model('ball')], [('file:///a', 'aa'), ('file:///b', 'bb')],
-                         [12, 13], np.array([2, 1], np.uint16))
-    content = json.loads(text)
-    assert content['classes']['1'] == {'name': 'cup', 'mesh': 'file:///a', 'sha256': 'aa',
-                                       'extents_m': [1, 1, 1], 'symmetry': [1, 2, 0]}
-    assert content['objects'] == {'12': {'category': 'ball', 'class_id': 2},
-                                  '13': {'category': 'cup', 'class_id': 1}}
+        def __init__(self, name, side=1, *variants):
+            self.name, self.extents, self.symmetry = name, np.full(3, side), np.array([1, 2, 0])
+            self.members = (self, *variants)
+    meshes = [[('file:///a', 'aa')], [('file:///b', 'bb'), ('file:///b.1', 'b1')]]
+    objects = replace(some_candidates(3), category=np.array([2, 1, 2], np.uint16),
+                      member=np.array([0, 0, 1], np.uint16))
+    content = json.loads(s.labels_json([Model('cup'), Model('ball', 1, Model('ball', 2))], meshes,
+                                       [12, 13, 14], objects))
+    cup, ball, large = (
+        {'mesh': f'file:///{mesh}', 'sha256': digest, 'extents_m': [side] * 3,
+         'symmetry': [1, 2, 0]}
+        for mesh, digest, side in (('a', 'aa', 1), ('b', 'bb', 1), ('b.1', 'b1', 2)))
+    assert content['classes'] == {'1': {'name': 'cup', **cup, 'members': [cup]},
+                                  '2': {'name': 'ball', **ball, 'members': [ball, large]}}
+    assert content['objects'] == {
+        '12': {'category': 'ball', 'class_id': 2, 'member': 0, 'mesh': 'file:///b',
+               'sha256': 'bb'},
+        '13': {'category': 'cup', 'class_id': 1, 'member': 0, 'mesh': 'file:///a',
+               'sha256': 'aa'},
+        '14': {'category': 'ball', 'class_id': 2, 'member': 1, 'mesh': 'file:///b.1',
+               'sha256': 'b1'}}

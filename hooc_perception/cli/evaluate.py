@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from hooc_perception.trained.folder import ModelFolder
 
 HELP = ("Score results against the ground truth of a scene set: the paper's Tables 1-4 and "
-        'stricter scores (centre within 2 cm, rotation up to symmetry). Scenes with instance '
+        'stricter scores (centre within 2 cm, rotation up to symmetry, size and surface, '
+        'certain but wrong estimates, calibration of the scores). Scenes with instance '
         'labels but no poses are scored by masks. Several results files are shown side by side; '
         'without results, Table 1 is printed in full.')
 MOVED = {
@@ -48,7 +49,8 @@ def add_arguments(parser: ArgumentParser) -> None:
                         'poses to Table 4, and draws objects with the meshes of its families')
     parser.add_argument('--json', metavar='FILE', help='write all scores as JSON')
     parser.add_argument('--markdown', metavar='FILE', help='write the tables as Markdown')
-    parser.add_argument('--plots', metavar='DIR', help='write plots of the scores (PNG)')
+    parser.add_argument('--plots', metavar='DIR',
+                        help='write plots of the scores (PNG), with a reliability diagram')
     options.add_moved(parser, MOVED)
 
 
@@ -109,6 +111,7 @@ def _tables(evaluations: Sequence['Evaluation'], scene_set: 'SceneSet',
             truth_energy: dict[str, 'Energy']) -> list['Table']:
     """Return every table that there are figures for."""
     from hooc_perception.evaluation import certainty, paper_tables
+    from hooc_perception.evaluation.shape_table import shape_table
 
     tables: list[Table | None] = [
         paper_tables.visibility_summary(visibility) if visibility else None,
@@ -116,7 +119,7 @@ def _tables(evaluations: Sequence['Evaluation'], scene_set: 'SceneSet',
     if any(e.scores for e in evaluations):
         tables += [paper_tables.paper_scores(),
                    paper_tables.energy_table(evaluations, truth_energy),
-                   paper_tables.strict_table(evaluations)]
+                   paper_tables.strict_table(evaluations), shape_table(evaluations)]
     for e in evaluations:
         if e.scores:
             tables += [paper_tables.category_table(e, scene_set.category_names),

@@ -9,9 +9,11 @@ from typing import Any
 
 from hooc_perception.core.types import Energy
 from hooc_perception.evaluation import paper
+from hooc_perception.evaluation.certainty import certainty_summary
 from hooc_perception.evaluation.evaluate import Evaluation
 from hooc_perception.evaluation.paper_tables import TERMS
 from hooc_perception.evaluation.scores import means
+from hooc_perception.evaluation.shape import shape_summary
 from hooc_perception.evaluation.visibility import Visibility
 from hooc_perception.io.scenes.scene_set import SceneSet
 import numpy as np
@@ -43,7 +45,8 @@ def as_json(scene_set: SceneSet, evaluations: Sequence[Evaluation],
         entry: dict[str, Any] = {'label': e.label, 'setting': e.setting, 'energy': e.energy}
         if e.scores:
             entry |= {'mean': means(e.scores), 'scenes': [asdict(s) for s in e.scores],
-                      'categories': e.per_category(scene_set.category_names)}
+                      'categories': e.per_category(scene_set.category_names),
+                      'certainty': certainty_summary(e), 'shape': _shape(e)}
         if e.masks:
             entry['masks'] = [asdict(m) for m in e.masks]
         if e.bop:
@@ -55,6 +58,14 @@ def as_json(scene_set: SceneSet, evaluations: Sequence[Evaluation],
         'truth_energy': {name: {t: getattr(energy, t) for t in TERMS}
                          for name, energy in truth_energy.items()},
         'paper': {'scores': paper.SCORES, 'energy': paper.ENERGY}})
+
+
+def _shape(evaluation: Evaluation) -> dict[str, Any]:
+    """Return the errors of size and surface: their means, and every object of every scene."""
+    every = [error for errors in evaluation.shapes.values() for error in errors]
+    return shape_summary(every) | {
+        'scenes': {name: [asdict(e) for e in errors] for name, errors in
+                   evaluation.shapes.items()}}
 
 
 def stages_as_json(scene_set: SceneSet, losses: Mapping[str, Any]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 """Whether scores are calibrated probabilities and sigmas match the errors."""
 
 from collections.abc import Iterator
+from typing import Any
 
 from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.evaluation.evaluate import Evaluation
@@ -10,6 +11,8 @@ from hooc_perception.evaluation.tables import Table
 import numpy as np
 
 SCORE_BINS = (0.0, 0.5, 0.7, 0.8, 0.9, 0.95, 1.0)
+# An estimate with a score above this is taken for certain.
+CERTAIN = 0.8
 
 
 def verdicts(evaluation: Evaluation) -> tuple[Float64Array, BoolArray]:
@@ -40,6 +43,46 @@ def reliability(score: Float64Array,
     return out
 
 
+def calibration_error(score: Float64Array, right: BoolArray) -> float:
+    """
+    Return the expected calibration error, NaN without estimates.
+
+    The mean over estimates of the distance, in the bin of each, between the mean score and the
+    share that is right.
+    """
+    bins = reliability(score, right)
+    n = sum(number for _, _, number, _, _ in bins)
+    return sum(number * abs(mean - share) for _, _, number, mean, share in bins) / (n or np.nan)
+
+
+def certain_and_wrong(score: Float64Array, right: BoolArray) -> tuple[int, int, float]:
+    """Return how many scores exceed CERTAIN, how many of these are wrong, and that share."""
+    certain = score > CERTAIN
+    n, wrong = int(certain.sum()), int((certain & ~right).sum())
+    return n, wrong, wrong / n if n else float('nan')
+
+
+def certainty_summary(evaluation: Evaluation) -> dict[str, Any]:
+    """
+    Return what `--json` holds of the scores of an Evaluation.
+
+    :return: {estimates, localized, mean_score, calibration_error, brier, certain: {above,
+        estimates, wrong, share}, bins: [{low, high, estimates, mean_score, localized}]}; the
+        `localized` are shares of estimates.
+    """
+    score, right = verdicts(evaluation)
+    some = len(score) > 0
+    certain, wrong, share = certain_and_wrong(score, right)
+    names = ('low', 'high', 'estimates', 'mean_score', 'localized')
+    return {'estimates': len(score),
+            'localized': float(right.mean()) if some else float('nan'),
+            'mean_score': float(score.mean()) if some else float('nan'),
+            'calibration_error': calibration_error(score, right),
+            'brier': float(((score - right) ** 2).mean()) if some else float('nan'),
+            'certain': {'above': CERTAIN, 'estimates': certain, 'wrong': wrong, 'share': share},
+            'bins': [dict(zip(names, row)) for row in reliability(score, right)]}
+
+
 def score_table(evaluation: Evaluation) -> Table | None:
     """Return the Table of scores beside the share that is right, None without estimates."""
     score, right = verdicts(evaluation)
@@ -50,7 +93,9 @@ def score_table(evaluation: Evaluation) -> Table | None:
     return Table(f'Scores as probabilities: {evaluation.label}',
                  ('score', 'estimates', 'mean score', 'localized'),
                  (*rows, ('all', len(score), float(score.mean()), float(right.mean()))),
-                 ('Calibrated: a score equals the share of such estimates that is localized.',),
+                 ('Calibrated: a score equals the share of such estimates that is localized. '
+                  f'Expected calibration error {calibration_error(score, right):.3f}, the mean '
+                  'distance between the two, weighted by the number of estimates.',),
                  (len(rows),))
 
 

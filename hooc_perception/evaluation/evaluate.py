@@ -15,6 +15,7 @@ from hooc_perception.evaluation.bop import bop_score, BopScene, BopScore
 from hooc_perception.evaluation.masks import MaskScore, score_masks
 from hooc_perception.evaluation.matching import in_frame_of, posed, PosedObject
 from hooc_perception.evaluation.scores import per_category, SceneScore, score_scene
+from hooc_perception.evaluation.shape import shape_errors, ShapeError
 from hooc_perception.evaluation.visibility import scene_visibility, Visibility
 from hooc_perception.io.scenes.scene_set import RecordedScene, SceneSet
 from hooc_perception.objects.mesh import load_mesh
@@ -39,6 +40,7 @@ class Evaluation:
     :ivar estimates: {scene: objects}.
     :ivar energy: {scene: {total, depth, probability, overlap}} from the results.
     :ivar bop: None where it was not computed.
+    :ivar shapes: {scene: errors of size and surface of its localized objects}.
     """
 
     label: str
@@ -48,6 +50,7 @@ class Evaluation:
     estimates: dict[str, list[PosedObject]]
     energy: dict[str, dict[str, float | None]] = field(default_factory=dict)
     bop: BopScore | None = None
+    shapes: dict[str, list[ShapeError]] = field(default_factory=dict)
 
     def per_category(self, categories: Iterable[str]) -> dict[str, dict[str, Any]]:
         """Return `scores.per_category` of all scenes with poses."""
@@ -111,6 +114,7 @@ def evaluate_results(scene_set: SceneSet, results: Mapping[str, Any],
     scores, masks, targets = [], [], []
     estimates: dict[str, list[PosedObject]] = {}
     energy: dict[str, dict[str, float | None]] = {}
+    shapes: dict[str, list[ShapeError]] = {}
     for scene in scene_set.scenes:
         entry = by_name.get(scene.name)
         found = ([posed(o) for o in in_frame_of(scene, entry)['objects']] if entry else [])
@@ -124,6 +128,7 @@ def evaluate_results(scene_set: SceneSet, results: Mapping[str, Any],
         if scene.truth is not None:
             truths = [posed(t) for t in scene.truth]
             scores.append(score_scene(scene.name, found, truths, models, **about))
+            shapes[scene.name] = shape_errors(scores[-1], found, truths, models)
             if visibility and scene.name in visibility:
                 views = [rectify(view, RECTIFY) for view in scene.depth()]
                 targets.append(BopScene(scores[-1], found, truths, views,
@@ -132,7 +137,7 @@ def evaluate_results(scene_set: SceneSet, results: Mapping[str, Any],
             masks.append(_masks(scene, found, models, about))
     setting = str(results.get('setting', 'A')).upper()
     return Evaluation(label, setting, tuple(scores), tuple(masks), estimates, energy,
-                      bop_score(targets) if targets else None)
+                      bop_score(targets) if targets else None, shapes)
 
 
 def _masks(scene: RecordedScene, found: list[PosedObject], models: Mapping[str, GenericModel],

@@ -1,12 +1,20 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Plots of the scores: bars per category and the distribution of the errors."""
+"""Plots of the scores: bars per category, distribution of the errors, reliability."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from hooc_perception.evaluation.certainty import reliability, sigma_errors, verdicts
+from hooc_perception.core.arrays import Float64Array
+from hooc_perception.evaluation.certainty import (
+    calibration_error,
+    CERTAIN,
+    reliability,
+    SCORE_BINS,
+    sigma_errors,
+    verdicts,
+)
 from hooc_perception.evaluation.evaluate import Evaluation
 from hooc_perception.evaluation.scores import pose_errors, SceneScore
 import matplotlib
@@ -84,38 +92,65 @@ def error_curves(named: Sequence[tuple[str, Sequence[SceneScore]]], path: str | 
 
 def certainty_plot(evaluations: Sequence[Evaluation], path: str | Path) -> None:
     """
-    Plot the share of right estimates over scores, and errors over sigmas.
+    Plot a reliability diagram of the scores, and errors over sigmas.
 
     :param evaluations: those without sigmas are left out of the second plot, which is omitted
         where none has any.
     """
     sigmas = [sigma_errors(e)['t'] * 1000 for e in evaluations]
-    n = 2 if any(map(len, sigmas)) else 1
-    figure, axes = _axes(4.5 * n, 3.6, n)
-    axes[0].plot([0, 1], [0, 1], color='0.7', lw=0.8)
-    for k, (e, pairs) in enumerate(zip(evaluations, sigmas)):
-        bins = np.array(reliability(*verdicts(e)), float).reshape(-1, 5)
-        colour = COLOURS[k % len(COLOURS)]
-        if len(bins):
-            # One standard deviation of the share, given so few estimates.
-            error = np.sqrt((bins[:, 4] * bins[:, 2] + 1) * ((1 - bins[:, 4]) * bins[:, 2] + 1)
-                            / (bins[:, 2] + 2) ** 2 / (bins[:, 2] + 3))
-            share = bins[:, 4]
-            error = [np.minimum(error, share), np.minimum(error, 1 - share)]
-            axes[0].errorbar(bins[:, 3], share, error, fmt='o-', ms=4, lw=1, color=colour,
-                             label=f'{e.label} ({int(bins[:, 2].sum())})')
-        if len(pairs):
-            axes[1].loglog(pairs[:, 1], np.maximum(pairs[:, 0], 0.2), 'o', ms=3, alpha=0.6,
-                           color=colour, label=e.label)
-            axes[1].loglog([1, 100], [1, 100], color='0.7', lw=0.8)
-    axes[0].set_ylim(0, 1.02)
-    axes[0].set_xlabel('mean score')
-    axes[0].set_ylabel('share that is localized')
-    axes[0].legend(frameon=False, fontsize=8)
-    if n == 2:
-        axes[1].set_xlabel('sigma_t, mm')
-        axes[1].set_ylabel('error of the centre, mm')
+    with_sigmas = any(map(len, sigmas))
+    with matplotlib.rc_context({'font.size': 9}):
+        figure = Figure(figsize=(9.0 if with_sigmas else 4.5, 4.4), layout='constrained')
+        axes = figure.subplot_mosaic(
+            [['shares', 'sigmas'], ['counts', 'sigmas']] if with_sigmas
+            else [['shares'], ['counts']], height_ratios=[3, 1])
+    for ax in axes.values():
+        ax.spines[['top', 'right']].set_visible(False)
+    _reliability(axes['shares'], axes['counts'], evaluations)
+    if with_sigmas:
+        _sigmas(axes['sigmas'], [(e.label, pairs) for e, pairs in zip(evaluations, sigmas)])
     figure.savefig(path, dpi=130)
+
+
+def _reliability(shares: Axes, counts: Axes, evaluations: Sequence[Evaluation]) -> None:
+    """Plot the share of right estimates over their mean score, and how many there are."""
+    shares.plot([0, 1], [0, 1], color='0.7', lw=0.8)
+    for k, e in enumerate(evaluations):
+        score, right = verdicts(e)
+        bins = np.array(reliability(score, right), float).reshape(-1, 5)
+        if not len(bins):
+            continue
+        n, mean, share = bins.T[2:]
+        # One standard deviation of the share, given so few estimates.
+        error = np.sqrt((share * n + 1) * ((1 - share) * n + 1) / (n + 2) ** 2 / (n + 3))
+        colour = COLOURS[k % len(COLOURS)]
+        shares.errorbar(mean, share, [np.minimum(error, share), np.minimum(error, 1 - share)],
+                        fmt='o-', ms=4, lw=1, color=colour,
+                        label=f'{e.label}: {len(score)} estimates, '
+                              f'off by {calibration_error(score, right):.3f}')
+        counts.stairs(np.histogram(score, SCORE_BINS)[0], SCORE_BINS, color=colour, lw=1.2)
+    for ax in (shares, counts):
+        ax.axvline(CERTAIN, color='0.6', lw=0.8, ls=':')
+        ax.set_xlim(0, 1.02)
+    shares.set_ylim(0, 1.02)
+    shares.set_ylabel('share that is localized')
+    shares.set_xlabel('mean score')
+    if shares.get_legend_handles_labels()[0]:
+        shares.legend(frameon=False, fontsize=8)
+    counts.set_ylim(bottom=0)
+    counts.set_xlabel('score')
+    counts.set_ylabel('estimates')
+
+
+def _sigmas(ax: Axes, named: Sequence[tuple[str, Float64Array]]) -> None:
+    """Plot the error of the centre over sigma_t, from (label, pairs of both in millimetres)."""
+    for k, (label, pairs) in enumerate(named):
+        if len(pairs):
+            ax.loglog(pairs[:, 1], np.maximum(pairs[:, 0], 0.2), 'o', ms=3, alpha=0.6,
+                      color=COLOURS[k % len(COLOURS)], label=label)
+    ax.loglog([1, 100], [1, 100], color='0.7', lw=0.8)
+    ax.set_xlabel('sigma_t, mm')
+    ax.set_ylabel('error of the centre, mm')
 
 
 def write_plots(folder: str | Path, evaluations: Sequence[Evaluation],

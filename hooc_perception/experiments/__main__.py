@@ -22,8 +22,10 @@ def main(argv: Sequence[str] | None = None) -> int:
                         help='folder of all computed files (default: results)')
     parser.add_argument('--set', action='append', default=[], metavar='NAME[=FOLDER]',
                         help='a set to evaluate; twin needs no folder (default: twin)')
-    parser.add_argument('--rows', nargs='+', default=list(plan.ROWS), metavar='ROW',
-                        help=f'only these rows of {", ".join(plan.ROWS)}')
+    parser.add_argument('--rows', nargs='+', metavar='ROW',
+                        help=f'only these rows of {", ".join(plan.ROWS)} (default: all; '
+                             + '; '.join(f'of {name}: {", ".join(rows)}'
+                                         for name, rows in plan.ROWS_OF.items()) + ')')
     parser.add_argument('--keep', nargs='+', default=[], metavar='ROW',
                         help='rows that are kept even though their code has changed')
     parser.add_argument('--force', nargs='+', default=[], metavar='ROW',

@@ -33,6 +33,10 @@ class Switch:
         return f'{ROW}/{self.name.replace(" ", "_")}'
 
 
+NO_VERIFIER = Switch('no verifier', ('parse.verify_weight=0',))
+# Setting B of a profile without its verifier; its answers lie in a folder of this name.
+UNVERIFIED = 'B_no_verifier'
+
 SWITCHES = (
     Switch('flat table', ('observe.uneven_m=0',)),
     Switch('no smoothing of probabilities', ('classify.smoothing_steps=0',)),
@@ -42,7 +46,7 @@ SWITCHES = (
     Switch('no free-space term', ('parse.free_weight=0',)),
     Switch('no size prior', ('parse.size_prior=0',)),
     Switch('no overlap cost', ('parse.overlap=0',)),
-    Switch('no verifier', ('parse.verify_weight=0',)),
+    NO_VERIFIER,
     Switch('no re-proposal', ('parse.rounds=0',)),
     Switch('no half turns', ('parse.turn_steps=0',)),
     Switch('no refinement in parsing', ('parse.polish_steps=0',)),

@@ -6,6 +6,7 @@ from typing import Any
 
 from hooc_perception.evaluation import paper
 from hooc_perception.evaluation.tables import Cell, Table
+from hooc_perception.experiments.ablations import UNVERIFIED
 import numpy as np
 
 HOOC = 'the paper, on HOOC'
@@ -16,7 +17,13 @@ Scores = dict[str, Any]
 
 def of_setting(scores: Scores, setting: str) -> dict[str, Any] | None:
     """Return the result of a setting in a scores file, None where there is none."""
-    return next((r for r in scores['results'] if r['setting'] == setting), None)
+    return next((r for r in scores['results'] if _setting(r) == setting), None)
+
+
+def _setting(result: dict[str, Any]) -> str:
+    """Return 'A', 'B' or UNVERIFIED, which only the folder of its answer tells from 'B'."""
+    folder = result.get('label', '').partition('/')[0]
+    return UNVERIFIED if folder == UNVERIFIED else result['setting']
 
 
 def details_of(posed: dict[str, Scores], masked: dict[str, Scores]) -> list[Table]:

@@ -5,12 +5,17 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from hooc_perception.evaluation import paper
+from hooc_perception.evaluation import paper, shape_table
 from hooc_perception.evaluation.tables import Cell, Table
 from hooc_perception.experiments import ablations
 from hooc_perception.experiments.detail_tables import HOOC, of_setting, Scores
 from hooc_perception.experiments.records import Record, seconds_per_scene
 import numpy as np
+
+# Settings in the order of the tables, and what these call them.
+SETTINGS = {'A': 'A', 'B': 'B', ablations.UNVERIFIED: 'B, no verifier'}
+# Sets in the order of the tables, those of objects unlike the generic models first.
+SETS = ('shapes', 'osd', 'dev', 'twin')
 
 
 def summary_of(name: str, posed: dict[str, Scores], masked: dict[str, Scores],
@@ -27,8 +32,8 @@ def summary_of(name: str, posed: dict[str, Scores], masked: dict[str, Scores],
                for row, s in (posed | masked).items()}
     out = []
     if posed:
-        out = [score_table(posed, seconds), *([stage_table(stages)] if stages else []),
-               category_table(posed, stages)]
+        out = [score_table(posed, seconds), certain_table(posed),
+               *([stage_table(stages)] if stages else []), category_table(posed, stages)]
     if masked:
         out.append(mask_table(masked, seconds))
     return out
@@ -48,22 +53,24 @@ def score_table(scores: dict[str, Scores], seconds: Mapping[str, float | None]) 
     """Return one row for every row and setting, the paper's own figures above them."""
     rows: list[tuple[Cell, ...]] = []
     bold = []
-    for setting in 'AB':
-        bold.append(len(rows))
-        rows.append((HOOC, setting, *(_three(paper.mean(setting, c))
-                                      for c in ('found', 'localized')), None, None,
-                     f'{paper.mean(setting, "false_categories"):.1f}', *(None,) * 7))
+    for setting, called in SETTINGS.items():
+        if setting in paper.SCORES:
+            bold.append(len(rows))
+            rows.append((HOOC, setting, *(_three(paper.mean(setting, c))
+                                          for c in ('found', 'localized')), None, None,
+                         f'{paper.mean(setting, "false_categories"):.1f}', *(None,) * 7))
         for row, content in scores.items():
             result = of_setting(content, setting)
             if result is not None:
-                rows.append((f'`{row}`', setting, *_score_cells(result),
+                rows.append((f'`{row}`', called, *_score_cells(result),
                              _whole(seconds[row]) if setting == 'A' else None))
     return Table('Found and localized',
                  ('', 'setting', 'found', 'localized', '< 2 cm', '< 15 deg', 'false', 'mm', 'deg',
                   'AR VSD', 'AR MSSD', 'AR MSPD', 'AR', 'CPU s'), tuple(rows),
                  ('Means over scenes. Setting A: the full chain; B: the true poses are among the '
-                  'candidates. < 15 deg: share of the true objects that are localized with a '
-                  'rotation error below 15 degrees, up to symmetry; false: false categories per '
+                  'candidates; no verifier: with `parse.verify_weight=0`. < 15 deg: share of the '
+                  'true objects that are localized with a rotation error below 15 degrees, up to '
+                  'symmetry; false: false categories per '
                   "scene; mm, deg: median errors of the localized objects; AR: BOP's average "
                   'recalls; CPU s: processor seconds per scene, including start-up and the '
                   'loading of compiled code.',),
@@ -80,6 +87,17 @@ def _score_cells(result: dict[str, Any]) -> tuple[Cell, ...]:
             f'{1000 * np.median([o["centre_m"] for o in placed]):.0f}' if placed else None,
             f'{np.median(degrees):.0f}' if placed else None,
             *(bop.get(key) for key in ('vsd', 'mssd', 'mspd', 'average')))
+
+
+def certain_table(scores: dict[str, Scores]) -> Table:
+    """Return certain but wrong estimates and errors of size and surface, row by row."""
+    empty: tuple[Cell, ...] = (None,) * len(shape_table.HEADER)
+    rows = [(f'`{row}`', called, *(shape_table.shape_cells(result['certainty'], result['shape'])
+                                   if 'shape' in result else empty))
+            for setting, called in SETTINGS.items() for row, content in scores.items()
+            if (result := of_setting(content, setting))]
+    return Table(shape_table.TITLE, ('', 'setting', *shape_table.HEADER), tuple(rows),
+                 (shape_table.NOTE,))
 
 
 def stage_table(stages: dict[str, Any]) -> Table:
@@ -171,7 +189,7 @@ def mask_table(scores: dict[str, Scores], seconds: Mapping[str, float | None]) -
 def step_table(records: Mapping[str, Record]) -> Table:
     """Return what every step took, the switches of a set as one, and the code that ran."""
     groups: dict[str, list[Record]] = {}
-    for name, record in sorted(records.items()):
+    for name, record in sorted(records.items(), key=lambda item: (_rank(item[0]), item[0])):
         head, row, *rest = name.split('/')
         if row == ablations.ROW:
             name = f'{head}/{row}'
@@ -188,6 +206,12 @@ def step_table(records: Mapping[str, Record]) -> Table:
                   'machine that may have been busy; MB: peak memory; code: the commit, + where '
                   'files had uncommitted changes. (n): number of steps in that row.',),
                  (len(rows) - 1,))
+
+
+def _rank(step: str) -> int:
+    """Return where the set of a step comes in the tables."""
+    name = step.partition('/')[0]
+    return SETS.index(name) if name in SETS else len(SETS)
 
 
 def _joined(commits: Iterable[str]) -> str | None:

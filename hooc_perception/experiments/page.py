@@ -26,7 +26,11 @@ from hooc_perception.io.scenes.files import write_atomically
 
 END = '<!-- end of results -->'
 SECTION = re.compile(r'(<!-- results: ([\w ]+) -->\n).*?(' + re.escape(END) + ')', re.S)
-PICTURES = ('errors', 'categories', 'certainty')
+PICTURES = {'errors': 'Share of the true objects of {} below an error of the centre and of the '
+                      'rotation',
+            'categories': 'Found and localized share of each category of {}',
+            'certainty': 'Reliability diagram of the scores of {}'}
+WORST = 'What best missed and got wrong in its worst scenes of {}'
 
 
 def sections_of(root: str | Path, sets: Iterable[str],
@@ -52,12 +56,23 @@ def sections_of(root: str | Path, sets: Iterable[str],
         if less:
             out[f'{name} {ablations.ROW}'] = '\n'.join(map(to_markdown, ablations.tables_of(
                 name, scores.get('best'), less, records)))
+        if pictures := _pictures(layout):
+            out[f'{name} pictures'] = '\n\n'.join(
+                f'![{text.format(name)}](images/results_{name}_{source.stem}.png)'
+                for source, text in pictures.items())
         worst = layout.worst / 'worst.json'
         if worst.exists():
             out[f'{name} worst'] = to_markdown(worst_table(json.loads(worst.read_text())))
     if records:
         out['steps'] = to_markdown(step_table(records))
     return out
+
+
+def _pictures(layout: Layout) -> dict[Path, str]:
+    """Return {file: what it shows} of the pictures of a set that exist."""
+    every = {layout.plots / f'{name}.png': text for name, text in PICTURES.items()}
+    every[layout.worst / 'worst.png'] = WORST
+    return {path: text for path, text in every.items() if path.exists()}
 
 
 def _contents(files: Mapping[str, Path]) -> dict[str, Any]:
@@ -101,10 +116,7 @@ def write_pages(pages: Sequence[Path], images: str | Path, root: str | Path,
             write_atomically(page, text)
             written.append(page)
     for name in sorted(named & set(sets)):
-        layout = Layout(Path(root), name)
-        for folder, picture in (*((layout.plots, p) for p in PICTURES), (layout.worst, 'worst')):
-            source = folder / f'{picture}.png'
-            if source.exists():
-                written.append(Path(images) / f'results_{name}_{picture}.png')
-                shutil.copyfile(source, written[-1])
+        for source in _pictures(Layout(Path(root), name)):
+            written.append(Path(images) / f'results_{name}_{source.stem}.png')
+            shutil.copyfile(source, written[-1])
     return written

@@ -13,14 +13,17 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hooc_perception.chain import PROFILES
+from hooc_perception.core.profiles import profile
 from hooc_perception.errors import HoocError
+from hooc_perception.experiments.ablations import NO_VERIFIER, Switch, SWITCHES, UNVERIFIED
 from hooc_perception.experiments.ablations import ROW as ABLATIONS
-from hooc_perception.experiments.ablations import SWITCHES
 from hooc_perception.io.scenes.scene_set import load_scene_set
 
 BASELINES = ('fpfh', 'ppf')
 SCORED = PROFILES + BASELINES
 ROWS = SCORED + (ABLATIONS,)
+# Of a set that is not listed here, all rows are made where none are asked for.
+ROWS_OF = {'shapes': ('best', 'fast')}
 
 # Modules whose code, with all that they import, a kind of step runs.
 _SETS = 'hooc_perception.io.scenes.scene_set'
@@ -75,7 +78,7 @@ class Layout:
         return self.root / self.name / 'models' / row
 
     def results(self, row: str, setting: str) -> Path:
-        """Return the results file of a row in setting 'A' or 'B'."""
+        """Return the results file of a row in setting 'A', 'B' or UNVERIFIED."""
         return self.root / self.name / setting / f'{row}.json'
 
     def scores(self, row: str) -> Path:
@@ -146,7 +149,7 @@ class _SetPlan:
                 self._scores(row, [answer])]
 
     def _profile(self, row: str) -> list[Step]:
-        """Return the steps of a profile: training, settings A and B, scores, stages."""
+        """Return the steps of a profile: training, every setting, scores, stages."""
         path, model, answers = self.path, self.layout.model(row), [self.layout.results(row, 'A')]
         out = [self._step(row, 'train', 'train',
                           ['train', path, '--profile', row, '--seed', self.seed, '--jobs',
@@ -155,8 +158,10 @@ class _SetPlan:
         out.append(self._step(row, 'A', 'parse', parse, [model], answers[0]))
         if not self.posed:
             return [*out, self._scores(row, answers)]
-        answers.append(self.layout.results(row, 'B'))
-        out.append(self._step(row, 'B', 'parse', [*parse, '--true-poses'], [model], answers[1]))
+        for setting, more in _true_pose_settings(row).items():
+            answers.append(self.layout.results(row, setting))
+            out.append(self._step(row, setting, 'parse', [*parse, '--true-poses', *more], [model],
+                                  answers[-1]))
         return [*out, self._scores(row, answers, model),
                 self._step(row, 'stages', 'stages', ['stages', path, '--model', model], [model],
                            self.layout.stages(row))]
@@ -166,10 +171,9 @@ class _SetPlan:
         out, model = [], self.layout.model('best')
         for switch in SWITCHES:
             answer = self.layout.results(switch.row, 'A')
-            changed = [text for p in switch.parameters for text in ('--set-parameter', p)]
             out += [self._step(switch.row, 'A', 'parse',
                                ['parse', self.path, '--model', model, '--profile', 'best',
-                                '--seed', self.seed, *changed], [model], answer),
+                                '--seed', self.seed, *_changed(switch)], [model], answer),
                     self._scores(switch.row, [answer])]
         return out
 
@@ -189,16 +193,28 @@ class _SetPlan:
         return out
 
 
+def _changed(switch: Switch) -> list[str]:
+    """Return the options of `hooc parse` that switch a part off."""
+    return [text for p in switch.parameters for text in ('--set-parameter', p)]
+
+
+def _true_pose_settings(row: str) -> dict[str, list[str]]:
+    """Return {setting: more options} of a profile's answers with the true poses in the pool."""
+    verified = 'verify_weight' in profile(row).stage('parse').values()
+    return {'B': [], **({UNVERIFIED: _changed(NO_VERIFIER)} if verified else {})}
+
+
 def steps_of(sets: Mapping[str, str | Path | None], root: str | Path,
-             rows: Sequence[str] = ROWS, seed: int = 0, jobs: int = 0) -> list[Step]:
+             rows: Sequence[str] | None = None, seed: int = 0, jobs: int = 0) -> list[Step]:
     """
     Return the [Step] of all experiments, in an order in which they can run.
 
     :param sets: {name: folder, or None for the twin, which is then written first}.
     :param root: folder of everything that is computed.
+    :param rows: None = those of ROWS_OF, and all of a set that it does not name.
     :raises HoocError: where a row or a set does not exist.
     """
-    for row in rows:
+    for row in rows or ():
         if row not in ROWS:
             raise HoocError(f'there is no row {row!r}; choose among {", ".join(ROWS)}')
     out = []
@@ -215,7 +231,7 @@ def steps_of(sets: Mapping[str, str | Path | None], root: str | Path,
             path = Path(folder)
             posed = any(scene.truth for scene in load_scene_set(path).scenes)
         plan = _SetPlan(layout, path, posed, str(seed), str(jobs))
-        wanted = _with_best(layout, rows)
+        wanted = _with_best(layout, ROWS_OF.get(name, ROWS) if rows is None else rows)
         for row in wanted:
             out += plan.row(row)
         if posed:

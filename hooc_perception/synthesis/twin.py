@@ -128,7 +128,8 @@ def kinect_rig(rng: np.random.Generator, count: int = 3) -> tuple[Camera, ...]:
 
 
 def _scene(name: str, count: int, models: Sequence[GenericModel], relatives: Population,
-           cameras: Sequence[Camera], room: Room, rng: np.random.Generator, options: TwinOptions) -> NewScene:
+           cameras: Sequence[Camera], room: Room, rng: np.random.Generator,
+           options: TwinOptions) -> NewScene:
     """Return the NewScene of one name, with `count` objects."""
     maker = body_maker(models, relatives)
     placed, caster, visible = _arrangement(name, count, maker, cameras, room, rng, options)

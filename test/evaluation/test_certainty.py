@@ -5,6 +5,9 @@
 from types import SimpleNamespace
 
 from hooc_perception.evaluation.certainty import (
+    calibration_error,
+    certain_and_wrong,
+    certainty_summary,
     reliability,
     score_table,
     sigma_errors,
@@ -44,6 +47,43 @@ def test_scores_that_are_probabilities_lie_on_the_diagonal(made_up):
         assert abs(mean - share) < 3 * 0.5 / np.sqrt(n)
     table = score_table(made_up)
     assert table.rows[-1][1] == 400 == sum(row[1] for row in table.rows[:-1])
+
+
+def test_certain_but_wrong_and_calibration_by_hand(models):
+    truth = PosedObject('can', np.zeros(3), np.array([0, 0, 0, 1.0]), models['can'].extents)
+
+    def can(score, x):
+        return PosedObject('can', np.array([x, 0, 0]), truth.rotation_xyzw, truth.size, score)
+
+    # Above .8: one right, one astray, and one doubled, whose place is taken. A score of .8
+    # itself is not above it.
+    estimates = {'a': [can(0.9, 0.0), can(0.85, 0.02)], 'b': [can(0.99, 1.0)], 'c': [can(0.8, 0)],
+                 'd': [can(0.2, 1.0)]}
+    scores = tuple(score_scene(name, objects, [truth], models)
+                   for name, objects in estimates.items())
+    some = SimpleNamespace(label='some', scores=scores, estimates=estimates)
+    score, right = verdicts(some)
+    assert right.tolist() == [True, False, False, True, False]
+    assert certain_and_wrong(score, right) == (3, 2, pytest.approx(2 / 3))
+    summary = certainty_summary(some)
+    assert summary['certain'] == {'above': 0.8, 'estimates': 3, 'wrong': 2,
+                                  'share': pytest.approx(2 / 3)}
+    assert (summary['estimates'], summary['localized']) == (5, 0.4)
+    # Bins: .2 (0 of 1), .8 and .85 (1 of 2), .9 (1 of 1), .99 (0 of 1).
+    assert [b['estimates'] for b in summary['bins']] == [1, 2, 1, 1]
+    assert summary['calibration_error'] == pytest.approx(
+        (0.2 + 2 * (0.825 - 0.5) + 0.1 + 0.99) / 5)
+    assert summary['brier'] == pytest.approx(
+        (0.1 ** 2 + 0.85 ** 2 + 0.99 ** 2 + 0.2 ** 2 + 0.2 ** 2) / 5)
+    assert '0.388' in score_table(some).notes[0]
+
+
+def test_without_estimates_nothing_is_certain():
+    nobody = certainty_summary(SimpleNamespace(label='x', scores=(), estimates={}))
+    assert nobody['certain']['estimates'] == 0 and nobody['bins'] == []
+    assert np.isnan([nobody['certain']['share'], nobody['calibration_error'],
+                     nobody['brier']]).all()
+    assert np.isnan(calibration_error(np.zeros(0), np.zeros(0, bool)))
 
 
 def test_errors_lie_within_sigma_as_often_as_promised(made_up):

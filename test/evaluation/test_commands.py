@@ -22,7 +22,7 @@ def test_evaluate_prints_the_papers_tables(tiny_path, truth_file, capsys):
     assert main(['evaluate', str(tiny_path), str(truth_file)]) == 0
     out = capsys.readouterr().out
     for word in ('Table 1', 'Table 2', 'Table 4', 'paper, HOOC mean', 'Per category',
-                 'Explained masks', 'recall 1.000', '1.3000'):
+                 'Explained masks', 'recall 1.000', '1.3000', 'Certain but wrong, sizes'):
         assert word in out, word
     assert 'Table 3: parsing' not in out
     mean = next(line for line in out.splitlines() if line.startswith('mean  '))
@@ -49,6 +49,8 @@ def test_evaluate_writes_json_markdown_plots_and_csv(tiny_path, truth_file, tmp_
     scores = json.loads((out / 'a.json').read_text())
     assert scores['results'][0]['mean']['localized'] == 1
     assert scores['results'][0]['bop']['average'] == 1
+    assert scores['results'][0]['certainty']['certain']['wrong'] == 0
+    assert scores['results'][0]['shape']['surface_m'] == 0
     assert set(scores['visibility']) == {'10_1', '10_2'}
     assert 0 < scores['visibility']['10_1'][0]['total'] < 1
     assert '| **mean** |' in (out / 'a.md').read_text()

@@ -144,11 +144,14 @@ def distorted_truth(scene_set, rng):
     return {'format': 'hooc-results/1', 'dataset': scene_set.name, 'scenes': scenes}
 
 
-def test_agrees_with_the_independent_scorer(shared_scenes, tmp_path):
+@pytest.mark.parametrize('name', ['shapes', 'dev'])
+def test_agrees_with_the_independent_scorer(shared_scenes, tmp_path, name):
     scorer = shared_scenes.parent / 'tools' / 'score.py'
     if not scorer.is_file():
         pytest.skip('no independent scorer beside the repository')
-    scene_set = load_scene_set(shared_scenes / 'dev')
+    if not (shared_scenes / name).is_dir():
+        pytest.skip(f'no set {name} beside the repository')
+    scene_set = load_scene_set(shared_scenes / name)
     results = distorted_truth(scene_set, np.random.default_rng(0))
     (tmp_path / 'r.json').write_text(json.dumps(results))
     out = subprocess.run([sys.executable, scorer, scene_set.path, tmp_path / 'r.json'],

@@ -8,6 +8,7 @@ from hooc_perception.cli.main import main as hooc
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera
 from hooc_perception.experiments import fingerprint, plan, run
+from hooc_perception.experiments.ablations import UNVERIFIED
 from hooc_perception.io.scenes.scene_set import NewScene, TrueObject, write_scene_set
 import numpy as np
 import pytest
@@ -75,7 +76,7 @@ def write_scores(tmp_path, scene_set):
             files.append(layout.results(row, setting))
             files[-1].parent.mkdir(parents=True, exist_ok=True)
             files[-1].write_text(json.dumps({
-                'format': 'hooc-results/1', 'dataset': 'small', 'setting': setting,
+                'format': 'hooc-results/1', 'dataset': 'small', 'setting': setting[0],
                 'scenes': [{'scene': 'one', 'seconds': 2.0, 'energy': None,
                             'objects': objects(shift)}]}))
         assert hooc(['evaluate', str(scene_set), *map(str, files), '--json',
@@ -89,5 +90,5 @@ def write_scores(tmp_path, scene_set):
 def computed(write_scores, tmp_path):
     """Return a folder with real scores: the truth as the answer of best, spoilt as ppf's."""
     plots = plan.Layout(tmp_path / 'results', 'small').plots
-    write_scores('best', 0.0, 'AB', '--bop', '--plots', plots)
+    write_scores('best', 0.0, ('A', 'B', UNVERIFIED), '--bop', '--plots', plots)
     return write_scores('ppf', 0.07, 'A', '--bop', '--plots', plots)

@@ -35,7 +35,8 @@ def test_ablations_stand_on_the_model_of_best(tmp_path, ran):
         return [s.name for s in plan.steps_of({'twin': None}, tmp_path, rows)]
 
     switches = [f'twin/{s.row}/{what}' for s in SWITCHES for what in ('A', 'scores')]
-    best = [f'twin/best/{what}' for what in ('train', 'A', 'B', 'scores', 'stages')]
+    best = [f'twin/best/{what}' for what in ('train', 'A', 'B', 'B_no_verifier', 'scores',
+                                             'stages')]
     # Where there is no such model yet, and nothing to compare with, that row comes first.
     assert names('ablations') == ['twin/set', *best, *switches, 'twin/plots',
                                   'twin/worst']

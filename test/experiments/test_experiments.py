@@ -25,9 +25,32 @@ def test_the_plan_runs_in_its_order(tmp_path, scene_set):
         made.add(step.output)
     names = [step.name for step in steps]
     assert len(set(names)) == len(names)
-    # Two rows of baselines with two steps, three profiles with five, two steps per switch,
-    # two of pictures, and the twin.
-    assert len(names) == 2 * (2 * 2 + 3 * 5 + 2 * len(SWITCHES) + 2) + 1
+    # Two rows of baselines with two steps, three profiles with five and two of them with one more
+    # without the verifier, two steps per switch, two of pictures, and the twin.
+    assert len(names) == 2 * (2 * 2 + 3 * 5 + 2 + 2 * len(SWITCHES) + 2) + 1
+
+
+def test_shapes_are_a_set_of_their_own_model_with_fewer_rows(tmp_path, scene_set):
+    def rows(*asked):
+        steps = plan.steps_of({'shapes': scene_set, 'other': scene_set}, tmp_path, asked or None)
+        return {name: {s.row for s in steps if s.name.startswith(f'{name}/')} - {'plots'}
+                for name in ('shapes', 'other')}
+
+    assert rows() == {'shapes': {'best', 'fast'}, 'other': set(plan.ROWS)}
+    assert rows('paper') == {'shapes': {'paper'}, 'other': {'paper'}}
+    names = [s.name for s in plan.steps_of({'shapes': scene_set}, tmp_path, ('best', 'paper'))]
+    assert names == [*(f'shapes/paper/{w}' for w in ('train', 'A', 'B', 'scores', 'stages')),
+                     *(f'shapes/best/{w}' for w in ('train', 'A', 'B', 'B_no_verifier', 'scores',
+                                                    'stages')),
+                     'shapes/plots', 'shapes/worst']
+
+
+def test_setting_b_without_the_verifier_is_b_with_one_parameter_changed(tmp_path, scene_set):
+    steps = {s.name: s for s in plan.steps_of({'shapes': scene_set}, tmp_path, ('best',))}
+    plain, less = (steps[f'shapes/best/{w}'] for w in ('B', 'B_no_verifier'))
+    assert less.arguments[:-2] == (*plain.arguments[:-2], '--set-parameter',
+                                   'parse.verify_weight=0')
+    assert plain.inputs == less.inputs and less.output in steps['shapes/best/scores'].inputs
 
 
 @pytest.mark.parametrize('sets, rows, word', [
@@ -68,7 +91,8 @@ def test_a_lost_file_is_made_again_and_only_what_depends_on_it(tmp_path, ran):
     ran.clear()
     (layout.model('best') / 'file').write_text('another model')
     quiet(steps, tmp_path)
-    assert ran == ['twin/best/A', 'twin/best/B', 'twin/best/scores', 'twin/best/stages']
+    assert ran == ['twin/best/A', 'twin/best/B', 'twin/best/B_no_verifier', 'twin/best/scores',
+                   'twin/best/stages']
 
 
 def test_changed_code_runs_its_rows_again_but_for_those_that_are_kept(tmp_path, ran,
@@ -81,7 +105,7 @@ def test_changed_code_runs_its_rows_again_but_for_those_that_are_kept(tmp_path, 
         'new' if 'hooc_perception.parser' in roots or 'evaluation.baselines' in roots[0]
         else ''))
     quiet(steps, tmp_path, keep=('ppf',))
-    assert ran == ['twin/best/A', 'twin/best/B']
+    assert ran == ['twin/best/A', 'twin/best/B', 'twin/best/B_no_verifier']
     ran.clear()
     quiet(steps, tmp_path)
     assert ran == ['twin/ppf/A']
@@ -152,13 +176,22 @@ def cells(text, start):
 def test_the_truth_scores_one_in_every_column_and_a_spoilt_one_does_not(computed):
     records = {'small/best/A': run.Record('k', 'c', 'abc', 7.0, 9.0, 10.0)}
     sections = page.sections_of(computed, ['small', 'absent'], records)
-    assert set(sections) == {'small', 'small details', 'steps'}
+    assert set(sections) == {'small', 'small details', 'small pictures', 'steps'}
+    found, certain = sections['small'].split('### Certain but wrong', 1)
     perfect = ['1.000'] * 4 + ['0.0', '0', '0'] + ['1.00'] * 4
-    (a, b), (spoilt,) = cells(sections['small'], '`best`'), cells(sections['small'], '`ppf`')
+    (a, b, less), (spoilt,) = cells(found, '`best`'), cells(found, '`ppf`')
     assert a == ['best', 'A', *perfect, '7'] and b == ['best', 'B', *perfect, '-']
+    assert less == ['best', 'B, no verifier', *perfect, '-']
+    certain_a, _, certain_less = cells(certain, '`best`')
+    assert certain_a[2:] == ['2', '0', '0.000', '0.000', *['0.000'] * 4, '0.0']
+    assert certain_less[1:] == ['B, no verifier', *certain_a[2:]]
+    # The can counts as wrong; its score says that it is certain.
+    assert cells(certain, '`ppf`')[0][2:6] == ['2', '1', '0.500', '0.500']
     # Seven centimetres off: near enough for the box of 16 cm, not for the can of 12.
     assert spoilt[2:5] == ['1.000', '0.500', '0.000']
     assert float(spoilt[12]) < 0.3
+    assert 'images/results_small_certainty.png' in sections['small pictures']
+    assert 'worst' not in sections['small pictures']
     hooc_a, hooc_b = cells(sections['small'], 'the paper, on HOOC')
     assert hooc_a[2:4] == ['0.441', '0.292'] and hooc_b[2:4] == ['0.624', '0.566']
     assert cells(sections['small'], 'can')[0][1:] == ['1', '1', '0']
@@ -224,9 +257,10 @@ def test_the_pages_of_the_documentation_have_the_markers():
     names = set()
     for path in docs.glob('results*.md'):
         names |= page.inserted(path.read_text(), {}, str(path))[1]
-    assert names >= {f'{name}{what}' for name in ('twin', 'dev', 'osd')
+    assert names >= {f'{name}{what}' for name in ('shapes', 'osd', 'dev', 'twin')
                      for what in ('', ' details', ' ablations')} | {
-                         'steps', 'twin worst', 'dev worst'}
+                         'steps', 'twin worst', 'dev worst', 'shapes worst',
+                         'shapes pictures'}
 
 
 def test_the_command_says_what_is_wrong(tmp_path, capsys):

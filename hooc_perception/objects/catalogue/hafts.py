@@ -21,12 +21,14 @@ def resized(solid: Manifold, draw: Draw, spread: float = 0.07) -> Manifold:
 
     Only its largest part is kept, without closed voids, so that it is one solid for sure.
     """
-    parts = solid.decompose()
-    if len(parts) > 1:
-        solid = max(parts, key=Manifold.volume)
     size = draw.about(1.0, spread)
-    return solid.scale((size * draw.about(1.0, spread), size * draw.about(1.0, spread),
-                        size * draw.about(1.0, spread)))
+    scale = (size * draw.about(1.0, spread), size * draw.about(1.0, spread),
+             size * draw.about(1.0, spread))
+    solid = solid.scale(scale)
+    if scale == (1.0, 1.0, 1.0):
+        # The nominal shapes are whole; looking at their parts would change the last bits.
+        return solid
+    return max(solid.simplify(1e-5).decompose(), key=Manifold.volume)
 
 
 def smooth(points: npt.ArrayLike, count: int) -> Float64Array:

@@ -5,6 +5,7 @@
 from pathlib import Path
 
 from hooc_perception.cli.main import main as hooc
+from hooc_perception.core.profiles import profile
 from hooc_perception.errors import HoocError
 from hooc_perception.experiments import fingerprint, page, plan, run
 from hooc_perception.experiments.__main__ import main
@@ -50,6 +51,8 @@ def test_setting_b_without_the_verifier_is_b_with_one_parameter_changed(tmp_path
     plain, less = (steps[f'shapes/best/{w}'] for w in ('B', 'B_no_verifier'))
     assert less.arguments[:-2] == (*plain.arguments[:-2], '--set-parameter',
                                    'parse.verify_weight=0')
+    assert plan.VERIFIED == tuple(
+        p for p in plan.PROFILES if 'verify_weight' in profile(p).stage('parse').values())
     assert plain.inputs == less.inputs and less.output in steps['shapes/best/scores'].inputs
 
 

@@ -116,7 +116,7 @@ def scene_json(scene: DetectedScene) -> str:
     """Return the JSON of a result, as `detect` answers."""
     return json.dumps({
         'stamp_ns': scene.stamp_ns, 'frame': scene.frame,
-        'objects': [{'id': o.id, 'category': o.category, 'score': o.score,
+        'objects': [{'id': o.id, 'category': o.category, 'member': o.member, 'score': o.score,
                      'translation': o.translation.tolist(),
                      'rotation_xyzw': o.rotation_xyzw.tolist(), 'size': o.size.tolist(),
                      'sigma_t': _or_none(o.sigma_t), 'sigma_r': _or_none(o.sigma_r)}

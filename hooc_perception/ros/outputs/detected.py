@@ -20,16 +20,18 @@ class DetectedObject:
 
     :ivar id: persistent instance id.
     :ivar class_id: 1..N.
+    :ivar member: which mesh of the category's family was found, 0 = the generic one.
     :ivar translation: (3,) float64 centre of its bounding box, target frame, metres.
     :ivar rotation_xyzw: (4,) float64, model axes to target frame.
     :ivar size: (3,) float64 extents along the axes of the model, metres.
     :ivar sigma_t: metres within which 68 % of the errors lie, NaN = not estimated.
     :ivar sigma_r: the same for the rotation, radians.
-    :ivar model: the mesh of its category's family that was found.
+    :ivar model: that mesh.
     """
 
     id: int
     class_id: int
+    member: int
     score: float
     translation: Float64Array
     rotation_xyzw: Float64Array
@@ -75,8 +77,7 @@ def detected_scene(parsed: ParsedScene, ids: AnyArray, models: Sequence[GenericM
     sigma_t, sigma_r = (np.full(len(found), np.nan) if sigma is None else sigma
                         for sigma in (parsed.sigma_t, parsed.sigma_r))
     return DetectedScene(stamp_ns, frame, tuple(
-        DetectedObject(int(ids[i]), int(found.category[i]), float(found.score[i]),
-                       found.translation[i], found.rotation_xyzw[i],
-                       found.size[i].astype(float), float(sigma_t[i]), float(sigma_r[i]),
-                       model)
+        DetectedObject(int(ids[i]), int(found.category[i]), int(found.member[i]),
+                       float(found.score[i]), found.translation[i], found.rotation_xyzw[i],
+                       found.size[i].astype(float), float(sigma_t[i]), float(sigma_r[i]), model)
         for i, model in enumerate(found.shapes(models))))

@@ -130,8 +130,8 @@ def test_the_deep_pan_is_proposed(kitchen, pool):
     assert nearest(pool.take(deep), kitchen.truth, 0).min() < 0.03
 
 
-def test_the_deep_pan_is_the_result(kitchen, pool, families):
-    parsed = JointMethod(parse=CONFIG).parse(kitchen.frame, pool, 0, 1)
+def test_the_deep_pan_is_the_result(kitchen, pool, families, cheap):
+    parsed = JointMethod(cheap, CONFIG).parse(kitchen.frame, pool, 0, 1)
     found = parsed.objects
     assert sorted(found.category.tolist()) == [PAN, BOX]
     mine = int(np.flatnonzero(found.category == PAN)[0])
@@ -177,10 +177,11 @@ def test_volumes_are_those_of_the_members(families):
 
 
 def test_what_is_unexplained_depends_on_the_member(kitchen):
-    left = unexplained_points(kitchen.observation, kitchen.truth, kitchen.models)
     wrong = replace(kitchen.truth, member=np.array([SHALLOW, 0], np.uint16))
-    assert len(left) < 30
-    assert len(unexplained_points(kitchen.observation, wrong, kitchen.models)) > len(left) + 100
+    left, more = (unexplained_points(kitchen.observation, x, kitchen.models, 0.008)
+                  for x in (kitchen.truth, wrong))
+    # The bottom of a stretched pan is 1.6 cm higher.
+    assert len(more) > 1.3 * len(left) + 50
 
 
 def test_a_new_mesh_is_not_a_new_object(families):

@@ -96,7 +96,7 @@ def collision_object(found: DetectedObject, head: Header, shape: str, messages: 
     """
     Return the CollisionObject of a DetectedObject; its id is the name, such as teacup_7.
 
-    :param shape: 'mesh' = the scaled generic model, 'box' = its bounding box.
+    :param shape: 'mesh' = the scaled mesh that was found, 'box' = its bounding box.
     :param messages: the module moveit_msgs.msg.
     """
     kind = messages.CollisionObject

@@ -1,0 +1,85 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Every output of the parsing node shows the mesh that was found."""
+
+from dataclasses import replace
+import json
+from types import SimpleNamespace
+
+from hooc_perception.core.types import Candidates, Energy, ParsedScene
+from hooc_perception.objects.derive import derive
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from hooc_perception.ros.outputs.detect_service import scene_json
+from hooc_perception.ros.outputs.detected import detected_scene
+from hooc_perception.ros.outputs.object_output import ObjectOutput
+import trimesh  # noqa: E402
+
+STAMP = 1_700_000_000_250_000_000
+MESHES = [[('file:///pan.ply', 'p0'), ('file:///pan.1.ply', 'p1')], [('file:///can.ply', 'c0')]]
+
+
+@pytest.fixture(scope='module')
+def models():
+    """Return a family of two boxes, and a can."""
+    rng = np.random.default_rng(0)
+    low, high, can = (derive('x', mesh, rng, 50, 50) for mesh in (
+        trimesh.creation.box((0.2, 0.1, 0.03)), trimesh.creation.box((0.2, 0.1, 0.12)),
+        trimesh.creation.cylinder(0.03, 0.1)))
+    return (replace(low, name='pan', variants=(replace(high, name='pan'),)),
+            replace(can, name='can'))
+
+
+@pytest.fixture
+def parsed():
+    """Return the ParsedScene of a low pan, a high pan and a can, all 0.4 x 0.1 x 0.12 m."""
+    objects = Candidates(
+        np.array([1, 1, 2], np.uint16), np.array([[0, 0, 0.06], [0.5, 0, 0.06], [0, 0.5, 0.06]]),
+        np.tile([0, 0, 0, 1.0], (3, 1)), np.tile(np.float32([0.4, 0.1, 0.12]), (3, 1)),
+        np.ones(3, np.float32), np.array([0, 1, 0], np.uint16))
+    some = np.ones(3, np.float32)
+    return ParsedScene(objects, Energy(0, 0, 0), some, some, some, np.ones(3, np.uint8), objects)
+
+
+@pytest.fixture
+def sent(models, parsed):
+    """Return {topic: messages} of its publication under the ids 7, 8, 9."""
+    topics = {}
+    node = SimpleNamespace(publisher=lambda kind, topic, name=None: SimpleNamespace(
+        publish=topics.setdefault(name or topic, []).append))
+    output = ObjectOutput(node, models, MESHES)
+    output.publish(parsed, np.array([7, 8, 9], np.uint32), STAMP, 'table', 0.1, np.zeros((0, 3)))
+    return topics
+
+
+def test_markers_have_the_mesh_of_the_member_at_its_scale(sent):
+    markers = sent['objects/markers'][0].markers
+    assert [(m.ns, m.id, m.mesh_resource) for m in markers] == [
+        ('pan', 7, 'file:///pan.ply'), ('pan', 8, 'file:///pan.1.ply'),
+        ('can', 9, 'file:///can.ply')]
+    scale = [[m.scale.x, m.scale.y, m.scale.z] for m in markers]
+    np.testing.assert_allclose(scale[:2], [[2, 1, 4], [2, 1, 1]], rtol=1e-6)
+
+
+def test_labels_tell_the_mesh_of_each_object(sent):
+    labels = json.loads(sent['objects/labels'][0].data)
+    assert {key: (thing['member'], thing['mesh'], thing['sha256'])
+            for key, thing in labels['objects'].items()} == {
+        '7': (0, 'file:///pan.ply', 'p0'), '8': (1, 'file:///pan.1.ply', 'p1'),
+        '9': (0, 'file:///can.ply', 'c0')}
+    pan = labels['classes']['1']
+    assert [m['mesh'] for m in pan['members']] == ['file:///pan.ply', 'file:///pan.1.ply']
+    assert (pan['mesh'], pan['extents_m']) == ('file:///pan.ply', [0.2, 0.1, 0.03])
+    assert pan['members'][1]['extents_m'] == [0.2, 0.1, 0.12]
+
+
+def test_adapters_and_the_service_get_the_mesh_of_the_member(models, parsed):
+    scene = detected_scene(parsed, np.array([7, 8, 9]), models, STAMP, 'table')
+    assert [o.member for o in scene.objects] == [0, 1, 0]
+    assert [o.name for o in scene.objects] == ['pan_7', 'pan_8', 'can_9']
+    assert scene.objects[0].model is models[0]
+    assert scene.objects[1].model is models[0].variants[0]
+    assert [o['member'] for o in json.loads(scene_json(scene))['objects']] == [0, 1, 0]

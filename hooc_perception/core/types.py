@@ -181,7 +181,6 @@ class GenericModel:
     :ivar symmetry: axis order around each model axis, (3,) int32: 1 none, 2, 3, 4, ... and
         0 for a continuous (revolution) symmetry.
     :ivar variants: further meshes of the category, in the same axes.
-    :ivar built_in: whether training took the mesh from the built-in catalogue, not from the set.
     """
 
     name: str
@@ -196,7 +195,6 @@ class GenericModel:
     rest_probability: Float64Array
     symmetry: Int32Array
     variants: 'tuple[GenericModel, ...]' = ()
-    built_in: bool = False
 
     @property
     def members(self) -> 'tuple[GenericModel, ...]':

@@ -1,28 +1,22 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-The further meshes of a category, from the catalogue's family of the same name.
+Meshes of the catalogue's family of a category, as the mesh of the set lies and is sized.
 
-One generic pan is twice as shallow as the pan on the table. Hypotheses of a category are made from
-several meshes: the set's own, and those of the catalogue that differ most from it and from one
-another. The catalogue's axes are turned onto those of the set's mesh, so that an orientation
-means the same whichever mesh it was found with.
+The catalogue's axes are turned onto those of the set's mesh by quarter turns, so that an
+orientation means the same whichever mesh it was found with.
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.symmetry import symmetry_rotations
 from hooc_perception.core.types import GenericModel
-from hooc_perception.objects.catalogue import family_name, TRAINING, variant
-from hooc_perception.objects.derive import derive
+from hooc_perception.objects.catalogue import family_name, variant
 import numpy as np
 from scipy.spatial import cKDTree  # pyright: ignore[reportAttributeAccessIssue]
 import trimesh
 
-# Meshes of the catalogue beside the set's own one.
-MEMBERS = 3
 # A set's own mesh tells how large its objects are: a family that differs by more is scaled.
 SIZE_LIMIT = 2.0
 SAMPLES = 400
@@ -52,24 +46,6 @@ def family_meshes(model: GenericModel, styles: Sequence[int], rngs: Sequence[
     return meshes
 
 
-def with_family(model: GenericModel, rng: np.random.Generator,
-                members: int = MEMBERS) -> GenericModel:
-    """Return the model with variants from the catalogue; itself where no family has its name."""
-    family = family_name(model.name)
-    if family is None or members < 1:
-        return model
-    styles = TRAINING[family]
-    meshes = family_meshes(model, styles, [None] * len(styles))
-    clouds = [_unit_cloud(model.vertices, model.faces),
-              *(_unit_cloud(m.vertices, m.faces) for m in meshes)]
-    apart = np.array([[_distance(a, b) for a in clouds] for b in clouds])
-    chosen = [0]
-    for _ in range(min(members, len(meshes))):
-        chosen.append(int(np.argmax(apart[chosen].min(0))))
-    return replace(model, variants=model.variants + tuple(
-        replace(derive(model.name, meshes[k - 1], rng), built_in=True) for k in chosen[1:]))
-
-
 def _aligning(mesh: trimesh.Trimesh, model: GenericModel) -> Float64Array:
     """Return the rotation (3, 3) by quarter turns that brings a mesh closest to a model."""
     goal = _cloud(model.vertices, model.faces) / model.longest_side
@@ -84,11 +60,6 @@ def _cloud(vertices: Float64Array, faces: np.ndarray) -> Float64Array:
     """Return (SAMPLES, 3) points on the surface of a mesh."""
     mesh = trimesh.Trimesh(vertices, faces, process=False)
     return np.asarray(trimesh.sample.sample_surface(mesh, SAMPLES, seed=0)[0], np.float64)
-
-
-def _unit_cloud(vertices: Float64Array, faces: np.ndarray) -> Float64Array:
-    """Return points on the surface of a mesh, its bounding box scaled to the unit cube."""
-    return _cloud(vertices, faces) / np.maximum(np.ptp(vertices, axis=0), 1e-9)
 
 
 def _distance(a: Float64Array, b: Float64Array) -> float:

@@ -17,7 +17,9 @@ import numpy as np
 import trimesh
 
 # Share of the objects that are made from the set's own mesh where there are relatives.
-GENERIC_SHARE = 0.3
+GENERIC_SHARE = 0.5
+# Relatives differ by themselves: they are reshaped less than the generic model, by this factor.
+RELATIVE_STRENGTH = 0.5
 
 
 @dataclass(frozen=True)
@@ -74,6 +76,8 @@ class BodyMaker:
         :param generic_share: how often the generic model is taken although there are relatives.
         """
         relative = self._relative(category, rng, fold, generic_share)
+        if relative is not None:
+            strength *= RELATIVE_STRENGTH
         if relative is None:
             model, pieces, own = self.models[category - 1], self.pieces(category - 1), -1
         else:

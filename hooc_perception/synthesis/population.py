@@ -73,7 +73,7 @@ def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
         else:
             wanted += [(index, -1, copy % FOLDS, copy) for copy in range(COPIES)]
     given = [(index, shape, k % FOLDS) for index, model in enumerate(models)
-             for k, shape in enumerate(v for v in model.variants if not v.built_in)]
+             for k, shape in enumerate(model.variants)]
     made = Parallel(n_jobs=jobs)(
         delayed(_relative)(models[index], style, fold,
                            stage_rng(seed, 'relatives', index, style + 1, draw))

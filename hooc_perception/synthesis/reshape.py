@@ -26,14 +26,14 @@ if TYPE_CHECKING:
 # Standard deviations between two objects of one kind, as logarithms of their sides: overall, and
 # per side. Over 200 public meshes of household objects spread by .2 to .3 in size within their
 # category, and by about .2 along each axis.
-SIZE_SPREAD = 0.16
-ASPECT_SPREAD = 0.14
+SIZE_SPREAD = 0.14
+ASPECT_SPREAD = 0.12
 TAPER_SPREAD = 0.08
 BEND_SPREAD = 0.012
 LATTICE_SPREAD = 0.035
 # The same of the lengths of the parts along each axis, and of the girth at the knots between them.
-PART_SPREAD = 0.25
-GIRTH_SPREAD = 0.12
+PART_SPREAD = 0.15
+GIRTH_SPREAD = 0.06
 KNOTS = 5
 
 

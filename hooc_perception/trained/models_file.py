@@ -22,8 +22,7 @@ def write_models(file: Path, models: Sequence[GenericModel]) -> None:
     """Write models.npz; the members of each family follow one another."""
     members = [len(model.members) for model in models]
     models = [member for model in models for member in model.members]
-    arrays: dict[str, AnyArray] = {'members': np.array(members, np.int64),
-                                   'built_in': np.array([m.built_in for m in models])}
+    arrays: dict[str, AnyArray] = {'members': np.array(members, np.int64)}
     arrays |= {
         key: np.stack([np.asarray(_fields(m)[key]) for m in models]) for key in STACKED}
     for key in JOINED:
@@ -43,9 +42,6 @@ def read_models(file: Path, names: Sequence[str]) -> tuple[GenericModel, ...]:
         if members.shape != (len(names),) or members.dtype.kind != 'i' or (
                 members.min(initial=1) < 1 or members.max(initial=1) > n or members.sum() != n):
             raise ValueError('the families do not add up')
-        built_in = data.get('built_in', np.zeros(n, bool))
-        if built_in.shape != (n,):
-            raise ValueError(f'built_in has not one entry for each of {n} meshes')
         names = [name for name, count in zip(names, members) for _ in range(count)]
         for key in STACKED:
             if len(data[key]) != n:
@@ -58,8 +54,7 @@ def read_models(file: Path, names: Sequence[str]) -> tuple[GenericModel, ...]:
             parts[key] = np.split(data[key], np.cumsum(count)[:-1])
         models = tuple(
             GenericModel(name=name, **{k: data[k][i] for k in STACKED if k != 'volume'},
-                         volume=float(data['volume'][i]), built_in=bool(built_in[i]),
-                         **{k: parts[k][i] for k in JOINED})
+                         volume=float(data['volume'][i]), **{k: parts[k][i] for k in JOINED})
             for i, name in enumerate(names))
         for model in models:
             _check_model(model)

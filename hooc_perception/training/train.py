@@ -21,7 +21,6 @@ from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.objects.derive import derive
-from hooc_perception.objects.family import with_family
 from hooc_perception.objects.mesh import load_mesh
 from hooc_perception.synthesis.population import relatives_of
 from hooc_perception.synthesis.training_scenes import PAPER, training_scenes
@@ -38,7 +37,7 @@ from tqdm import tqdm
 T = TypeVar('T')
 PROFILES: dict[str, tuple[Config, ...]] = {
     'paper': (fit_pixels.PixelFitConfig(),),
-    'best': (FusedScenesConfig(), FitConfig(trees=42), VerifierConfig()),
+    'best': (FusedScenesConfig(), FitConfig(trees=60), VerifierConfig()),
     'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24),
              VerifierConfig(verifier_scenes=30)),
 }
@@ -117,9 +116,6 @@ def train(scene_set: TrainingSet, out: str | Path, profile: str = 'best', seed: 
         raise HoocError(f"{scene_set.path} names no cameras; training needs the cameras' layout")
     check_place(out, [category.name for category in scene_set.categories])
     models = generic_models(scene_set, seed, progress)
-    if profile != 'paper':
-        models = tuple(with_family(model, stage_rng(seed, 'family', index))
-                       for index, model in enumerate(models))
     classifier = train_classifier(models, scene_set.cameras, profile, seed,
                                   scene_set.max_instances, configs, jobs, progress)
     return save_model_folder(Path(out), scene_set.name, models, classifier, profile, seed,

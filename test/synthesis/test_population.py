@@ -13,12 +13,11 @@ import pytest
 
 @pytest.fixture(scope='module')
 def families(models):
-    """Return a rod with four variants of the set, and a box with one and one of the catalogue."""
+    """Return a rod with four variants, and a box with one."""
     box, can, ring, ball, rod, plate = models
     given = tuple(replace(m, name='rod') for m in (box, can, ball, plate))
     return (replace(rod, variants=given),
-            replace(box, variants=(replace(ring, name='box'),
-                                   replace(can, name='box', built_in=True))))
+            replace(box, variants=(replace(ring, name='box'),)))
 
 
 @pytest.fixture(scope='module')
@@ -30,16 +29,12 @@ def test_variants_of_the_set_are_relatives(families, population):
     rods, boxes = population
     assert len(rods) == COPIES + 4 and len(boxes) == DRAWS * len(TRAINING['box']) + 1
     for relatives, given in ((rods[COPIES:], families[0].variants),
-                             (boxes[-1:], families[1].variants[:1])):
+                             (boxes[-1:], families[1].variants)):
         for k, (relative, variant) in enumerate(zip(relatives, given, strict=True)):
             assert relative.model is variant and relative.fold == k % FOLDS
             points = np.concatenate(relative.pieces)
             np.testing.assert_allclose(np.ptp(points, axis=0), variant.extents, rtol=0.05,
                                        atol=2e-3)
-
-
-def test_variants_of_the_catalogue_are_drawn_from_their_family_instead(families, population):
-    assert not any(relative.model is families[1].variants[1] for relative in population[1])
 
 
 def test_the_seed_decides_whatever_the_jobs(families, population):

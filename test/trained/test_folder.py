@@ -75,7 +75,7 @@ def families(models):
     """Return two categories, the second with three meshes."""
     box, ball, can = models
     return (ball, replace(box, variants=(replace(can, name='box'),
-                                         replace(ball, name='box', built_in=True))))
+                                         replace(ball, name='box'))))
 
 
 @pytest.fixture
@@ -120,7 +120,6 @@ def test_folders_from_before_there_were_families(folder, models):
     def write(path):
         arrays = dict(np.load(path))
         assert arrays.pop('members').tolist() == [1, 1, 1]
-        assert not arrays.pop('built_in').any()
         np.savez(path, **arrays)
     _replace(folder, 'models.npz', write)
     back = load_model_folder(folder)

@@ -31,22 +31,6 @@ class PixelCosts(Config):
 
 
 @dataclass(frozen=True)
-class ResidueCosts(Config):
-    """What foreground costs that the shape error of an object beside it may have left over."""
-
-    residue_cost: float = param(0.5, 'Cost of a pixel next to what an object explains, on the '
-                                'same smooth surface; 1 = as any other unexplained pixel.', '',
-                                0.0, 1.0)
-    residue_share: float = param(0.3, 'Share of a smooth surface that an object has to explain '
-                                 'for the rest of it to count as its residue.', '', 0.0, 1.0)
-    residue_reach: float = param(0.25, 'How far residue reaches beyond the bounding box of the '
-                                 'object, as a share of its longest side.', '', 0.0, 2.0)
-    residue_behind_m: float = param(0.02, 'How far behind the reading residue is drawn: an object '
-                                    'that explains the reading better than that replaces it.',
-                                    'm', 0.0, 0.5)
-
-
-@dataclass(frozen=True)
 class ObjectCosts(Config):
     """Costs of one object of the subset, in pixels of the full images."""
 

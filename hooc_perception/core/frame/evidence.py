@@ -3,7 +3,6 @@
 """The stacked pixels of all views, and hypotheses rendered and compared with them."""
 
 from collections.abc import Sequence
-from functools import cached_property
 
 from hooc_perception.core.arrays import (
     AnyArray,
@@ -12,10 +11,9 @@ from hooc_perception.core.arrays import (
     Int32Array,
     Int64Array,
 )
-from hooc_perception.core.frame.costs import ResidueCosts
 from hooc_perception.core.frame.field import Cloud
 from hooc_perception.core.frame.kernels import compare as kernel
-from hooc_perception.core.frame.kernels import pixel_lists, residue
+from hooc_perception.core.frame.kernels import pixel_lists
 from hooc_perception.core.frame.kernels.pixel_lists import PixelLists
 from hooc_perception.core.frame.kernels.records import (
     Context,
@@ -27,7 +25,6 @@ from hooc_perception.core.frame.kernels.records import (
     Views,
 )
 from hooc_perception.core.frame.kernels.refine import refine_all
-from hooc_perception.core.frame.kernels.residue import PatchPixels, ResidueSettings
 from hooc_perception.core.frame.pixel_index import first_pixels, rows_of_pixels, stacked_index
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.render import is_closed
@@ -104,22 +101,6 @@ class Evidence:
                                       _as_floats(weights), output)
         return stats, pixel_lists.packed(output.start, n, output.pixel, output.depth, output.cost)
 
-    def with_residue(self, lists: PixelLists, hypotheses: Float64Array, size: AnyArray,
-                     costs: ResidueCosts) -> PixelLists:
-        """
-        Return PixelLists with what the shape error of each hypothesis may leave over.
-
-        :param hypotheses: (m, 10); `size` (m, 3) their extents, metres.
-        """
-        if not len(hypotheses) or costs.residue_cost >= 1:
-            return lists
-        reach = costs.residue_reach * size.max(1, keepdims=True, initial=0)
-        return PixelLists(*residue.with_residue(
-            lists, self.views, self._patch_pixels, np.ascontiguousarray(hypotheses[:, :10]),
-            (0.5 * size + reach).astype(np.float64),
-            ResidueSettings(float(costs.residue_cost), float(costs.residue_share),
-                            float(costs.residue_behind_m))))
-
     def _subjects(self, rows: Float64Array, shape: AnyArray,
                   me: AnyArray | Sequence[int] | None) -> Hypotheses:
         """Return Hypotheses as the kernels take them."""
@@ -127,14 +108,6 @@ class Evidence:
         return Hypotheses(np.ascontiguousarray(rows[:, :10], np.float64), shape,
                           self.shapes.category[shape],
                           np.full(len(rows), -1) if me is None else np.asarray(me, np.int64))
-
-    @cached_property
-    def _patch_pixels(self) -> PatchPixels:
-        """Return the pixels of each smooth patch."""
-        pixel = np.flatnonzero(self.views.patch >= 0)
-        order = np.argsort(self.views.patch[pixel], kind='stable')
-        count = np.bincount(self.views.patch[pixel], minlength=len(self.views.patch_size))
-        return PatchPixels(np.concatenate([[0], np.cumsum(count)]), pixel[order])
 
     def compose(self, members: AnyArray | Sequence[int], lists: PixelLists) -> Context:
         """Return the Context that the given rows of PixelLists make; nearest wins."""

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from hooc_perception.core.config import Config, group, param
 from hooc_perception.core.energy.local_search import LocalSearchConfig
-from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts, ResidueCosts
+from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,8 @@ class ParseConfig(Config):
     """
     Parameters of stage 4 of the joint method.
 
-    :ivar search: of the discrete search; `pixels` and `objects` of the joint energy, `residue`
-        of what shape errors leave over, `verdict` of the verifier.
+    :ivar search: of the discrete search; `pixels` and `objects` of the joint energy, `verdict`
+        of the verifier.
     """
 
     rounds: int = param(3, 'Rounds of refinement and re-proposal.', low=0)
@@ -45,5 +45,4 @@ class ParseConfig(Config):
     search: LocalSearchConfig = group(LocalSearchConfig(patience=8))
     pixels: PixelCosts = group(PixelCosts())
     objects: ObjectCosts = group(ObjectCosts())
-    residue: ResidueCosts = group(ResidueCosts())
     verdict: VerdictConfig = group(VerdictConfig())

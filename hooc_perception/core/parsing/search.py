@@ -104,7 +104,6 @@ class Search:
         H = hypotheses_of(new, shapes)
         stats, lists = self.evidence.compare_pixels(H, shapes.of(new),
                                                     self.config.pixels.weights())
-        lists = self.evidence.with_residue(lists, H, new.size, self.config.residue)
         first = not len(self.pool)
         self.stats = stats if first else np.concatenate([self.stats, stats])
         self.lists = lists if first else self.lists.extended(lists)

@@ -3,7 +3,6 @@
 """Fork, knife, spoon and spatula: flat outlines, bent."""
 
 from collections.abc import Callable
-from functools import partial
 
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.objects.catalogue.draw import Draw
@@ -89,4 +88,3 @@ def spatula(draw: Draw) -> Manifold:
 STYLES: dict[str, tuple[Callable[[Draw], Manifold], ...]] = {
     'fork': (fork, *FORKS), 'knife': (knife, *KNIVES), 'spoon': (spoon, *SPOONS),
     'spatula': (spatula, *SPATULAS)}
-BUILDERS = {name: partial(styles[0], Draw()) for name, styles in STYLES.items()}

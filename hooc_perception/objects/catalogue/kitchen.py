@@ -3,7 +3,6 @@
 """Plate, tray, frying pan and dustpan: wide and shallow objects."""
 
 from collections.abc import Callable
-from functools import partial
 
 from hooc_perception.objects.catalogue import dustpans, pans, plates, trays
 from hooc_perception.objects.catalogue.draw import Draw
@@ -11,5 +10,3 @@ from manifold3d import Manifold
 
 STYLES: dict[str, tuple[Callable[[Draw], Manifold], ...]] = {
     **plates.STYLES, **trays.STYLES, **pans.STYLES, **dustpans.STYLES}
-BUILDERS: dict[str, Callable[[], Manifold]] = {
-    name: partial(styles[0], Draw()) for name, styles in STYLES.items()}

@@ -1,9 +1,8 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Stapler, book, box, sellotape core and tube."""
+"""Stapler, book, box and tube."""
 
 from collections.abc import Callable
-from functools import partial
 
 from hooc_perception.objects.catalogue.books import BOOKS
 from hooc_perception.objects.catalogue.boxes import BOXES
@@ -57,12 +56,6 @@ def carton(draw: Draw) -> Manifold:
     return resized(body - (seam + thumb), draw, 0.12)
 
 
-def sellotape_core() -> Manifold:
-    """Return the broad ring on which adhesive tape is wound."""
-    outer = cylinder(0.046, 0.024, segments=48)
-    return outer - cylinder(0.0385, 0.03, at=(0.0, 0.0, -0.003), segments=48)
-
-
 def tube(draw: Draw) -> Manifold:
     """Return a cardboard tube, open at both ends, lying down."""
     outer = cylinder(0.022, 0.240, at=(0.0, -0.120, 0.022), axis='y', segments=48)
@@ -74,5 +67,3 @@ def tube(draw: Draw) -> Manifold:
 STYLES: dict[str, tuple[Callable[[Draw], Manifold], ...]] = {
     'stapler': (stapler, *STAPLERS), 'book': (book, *BOOKS), 'box': (carton, *BOXES),
     'tube': (tube, *TUBES)}
-BUILDERS = {'sellotape_core': sellotape_core,
-            **{name: partial(styles[0], Draw()) for name, styles in STYLES.items()}}

@@ -3,7 +3,6 @@
 """Hammer, screwdriver, drill and scissors."""
 
 from collections.abc import Callable
-from functools import partial
 
 from hooc_perception.objects.catalogue.draw import Draw
 from hooc_perception.objects.catalogue.drills import DRILLS
@@ -102,4 +101,3 @@ def scissors(draw: Draw) -> Manifold:
 STYLES: dict[str, tuple[Callable[[Draw], Manifold], ...]] = {
     'hammer': (hammer, *HAMMERS), 'screwdriver': (screwdriver, *SCREWDRIVERS),
     'drill': (drill, *DRILLS), 'scissors': (scissors, *SHEARS)}
-BUILDERS = {name: partial(styles[0], Draw()) for name, styles in STYLES.items()}

@@ -3,7 +3,6 @@
 """Teacup, glass, jug, bottle and bowl: vessels made on a lathe, with handles."""
 
 from collections.abc import Callable
-from functools import partial
 
 from hooc_perception.objects.catalogue import bottles, bowls, cups, glasses, jugs
 from hooc_perception.objects.catalogue.draw import Draw
@@ -11,5 +10,3 @@ from manifold3d import Manifold
 
 STYLES: dict[str, tuple[Callable[[Draw], Manifold], ...]] = {
     **cups.STYLES, **glasses.STYLES, **jugs.STYLES, **bottles.STYLES, **bowls.STYLES}
-BUILDERS: dict[str, Callable[[], Manifold]] = {
-    name: partial(styles[0], Draw()) for name, styles in STYLES.items()}

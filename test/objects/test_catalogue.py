@@ -2,7 +2,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """The catalogue: 25 watertight things of everyday size that a scene set can be made of."""
 
-from hooc_perception.objects.catalogue import CATALOGUE, write_catalogue
+from hooc_perception.objects.catalogue import (
+    CATALOGUE,
+    FAMILIES,
+    family_name,
+    HELD_OUT,
+    TRAINING,
+    variant,
+    write_catalogue,
+)
 from hooc_perception.objects.manifold import to_manifold
 from hooc_perception.objects.mesh import load_mesh
 import manifold3d
@@ -95,3 +103,33 @@ def test_default_rig_looks_at_the_table(tmp_path):
         assert (camera['width'], camera['height']) == (512, 424)
     sides = [np.linalg.norm(positions[i] - positions[i - 1]) for i in range(3)]
     np.testing.assert_allclose(sides, sides[0], rtol=1e-4)
+
+
+@pytest.mark.parametrize('name', list(FAMILIES))
+def test_every_member_of_a_family_is_one_sound_solid(name):
+    rng = np.random.default_rng(len(name))
+    for style in range(len(FAMILIES[name])):
+        for draw in (None, rng):
+            mesh = variant(name, style, draw)
+            assert mesh.is_watertight and mesh.volume > 0, style
+            assert to_manifold(mesh).status() == manifold3d.Error.NoError
+            assert 0.02 < mesh.extents.max() < 1.0 and len(mesh.faces) < 2500
+            np.testing.assert_allclose(mesh.bounds.sum(axis=0), 0, atol=1e-7)
+
+
+def test_a_seed_gives_one_member_and_other_seeds_others():
+    a, b, c = (variant('jug', 1, np.random.default_rng(seed)) for seed in (1, 1, 2))
+    np.testing.assert_array_equal(a.vertices, b.vertices)
+    assert np.abs(a.extents / c.extents - 1).max() > 0.01
+
+
+def test_training_and_the_twin_share_no_style():
+    for name, styles in FAMILIES.items():
+        assert len(styles) >= 9 and len(TRAINING[name]) >= 6 and len(HELD_OUT[name]) >= 3
+        assert sorted(TRAINING[name] + HELD_OUT[name]) == list(range(len(styles)))
+        assert 0 in TRAINING[name]
+
+
+def test_other_names_of_a_family():
+    assert family_name('Mug') == family_name('coffee cup') == 'teacup'
+    assert family_name('frying-pan') == 'frying_pan' and family_name('unicorn') is None

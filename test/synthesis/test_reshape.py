@@ -67,3 +67,15 @@ def test_placed_objects_are_reshaped_where_they_stand(models):
         assert new.vertices_world[:, 2].min() == pytest.approx(0, abs=1e-9)
         np.testing.assert_array_equal(new.translation[:2], o.translation[:2])
         assert not np.allclose(new.size, o.size, rtol=1e-3)
+
+
+def test_parts_of_a_long_object_grow_and_shrink_by_themselves(models):
+    rod = {m.name: m for m in models}['rod']
+    shares = []
+    for seed in range(40):
+        warp = random_warp(rod.vertices, np.random.default_rng(seed), 1.5)
+        assert (np.diff(warp.knots, axis=1) > 0).all()
+        np.testing.assert_allclose(warp.knots[:, [0, -1]], [[0, 1]] * 3, atol=1e-12)
+        shares.append(warp.knots[warp.axis, 2])
+    # The middle of the rod lies elsewhere in every one.
+    assert 0.02 < np.std(shares) < 0.2 and abs(np.mean(shares) - 0.5) < 0.05

@@ -4,7 +4,15 @@
 
 from dataclasses import replace
 
-from hooc_perception.training.fit_forest import fit, FitConfig, quantise, thresholds
+from hooc_perception.core.classification.forest import Forest
+from hooc_perception.synthesis.population import FOLDS
+from hooc_perception.training.fit_forest import (
+    fit,
+    FitConfig,
+    quantise,
+    thresholds,
+    unaware_of,
+)
 from hooc_perception.training.kernels.splits import best_split, Limits, x_log_x
 from hooc_perception.training.kernels.table_tree import grow_tree, Table, walk_binned
 import numpy as np
@@ -122,3 +130,20 @@ def test_every_leaf_keeps_its_least_size_and_no_class_dies_out():
     sizes = np.bincount(walk_binned(binned, feature, split, left),
                         minlength=len(feature))
     assert sizes[feature < 0].min() >= 25 and (sizes[feature >= 0] == 0).all()
+
+
+def test_no_tree_sees_the_samples_of_its_fold():
+    rng = np.random.default_rng(4)
+    x, y = toy(3000, rng)
+    # Class 0 occurs in fold 1 alone, where one feature gives it away.
+    fold = np.where(y == 0, 1, rng.integers(-1, FOLDS, len(y))).astype(np.int8)
+    x[:, 0] = np.where(y == 0, 9, x[:, 0])
+    cuts = thresholds(x, 32, rng)
+    config = FitConfig(trees=2 * FOLDS, features_per_node=12, bins=32, prior=0.1)
+    forest = fit(quantise(x, cuts), y, 5, cuts, config, np.random.default_rng(0), fold=fold)
+    arrays = forest.arrays('forest_')
+    told = {k: Forest.from_arrays(unaware_of(arrays, k, 'forest_'), 'forest_').predict(x[y == 0])
+            for k in range(FOLDS)}
+    assert told[1][:, 0].max() < 0.2 and min(told[0][:, 0].min(), told[2][:, 0].min()) > 0.8
+    trees = [len(unaware_of(arrays, k, 'forest_')['forest_roots']) for k in range(FOLDS)]
+    assert trees == [2] * FOLDS

@@ -20,6 +20,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     options.add_profile(parser, 'best')
     parser.add_argument('--seed', type=int, default=0,
                         help='the same seed gives the same model (default: %(default)s)')
+    parser.add_argument('--relatives', action='store_true',
+                        help='also train on shapes that only share the name with the meshes: the '
+                        'families of the built-in catalogue, reshaped copies elsewhere')
     parser.add_argument('--jobs', type=int, default=0, metavar='N',
                         help='parallel workers, 0 = all cores; does not change the model')
     options.add_executor(parser)
@@ -31,13 +34,14 @@ def run(args: Namespace) -> None:
     from hooc_perception.errors import HoocError
     from hooc_perception.executor import executor
     from hooc_perception.io.scenes.scene_set import load_scene_set
-    from hooc_perception.training.train import train
+    from hooc_perception.training.train import configs_of, train
     if args.seed < 0 or args.jobs < 0:
         raise HoocError('--seed and --jobs must not be negative')
     folder_place(args.out, '--out')
     start = time.monotonic()
     scene_set = load_scene_set(args.set, with_scenes=False)
     with executor(args.executor):
-        folder = train(scene_set, args.out, args.profile, args.seed, jobs=args.jobs)
+        folder = train(scene_set, args.out, args.profile, args.seed, jobs=args.jobs,
+                       configs=configs_of(args.profile, args.relatives))
     print(f'{folder.path}: {len(folder.models)} categories, profile {folder.profile}, '
           f'{time.monotonic() - start:.0f} s')

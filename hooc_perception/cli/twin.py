@@ -26,6 +26,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument('--strength', type=float, default=1.0, metavar='S',
                         help='how far objects deviate from their generic models, 0 to 2 '
                         '(default: %(default)g)')
+    parser.add_argument('--families', action='store_true',
+                        help='make the objects from styles of the built-in catalogue that '
+                        'training never sees')
     parser.add_argument('--jobs', type=int, default=0, metavar='N',
                         help='parallel workers, 0 = all cores; does not change the set')
     options.add_executor(parser)
@@ -39,6 +42,7 @@ def run(args: Namespace) -> None:
     if args.jobs < 0:
         raise HoocError('--jobs must not be negative')
     folder_place(args.out, '--out')
-    options = TwinOptions(tuple(args.scene), args.cameras, args.repeat, args.strength)
+    options = TwinOptions(tuple(args.scene), args.cameras, args.repeat, args.strength,
+                          args.families)
     with executor(args.executor):
         print(write_twin(args.out, args.seed, options, progress=True, jobs=args.jobs or -1))

@@ -85,7 +85,8 @@ class BodyMaker:
         if strength <= 0:
             return Body(category, model.vertices, model.faces, pieces, model.rest_rotations, own)
         vertices, _, warp = reshape(model.vertices, model.faces, rng, strength,
-                                    model.symmetry if symmetry else None)
+                                    model.symmetry if symmetry else None,
+                                    structure=float(bool(self.population)))
         return Body(category, vertices, model.faces, [warp(p) for p in pieces],
                     model.rest_rotations, own)
 

@@ -3,9 +3,9 @@
 """
 The shapes from which the objects of training scenes are made.
 
-A category is more than one mesh: where the built-in catalogue has a family of its name, its
-members (relatives) take part in training beside the mesh of the set; where it has none, strongly
-reshaped copies of that mesh do. Further meshes of a category that the set gives are relatives as
+A category is more than one mesh. Its relatives take part in training beside the generic mesh: the
+variants that the set gives and, where training asks for them, members of the built-in catalogue's
+family of the same name, or strongly reshaped copies where there is none. Further meshes of a category that the set gives are relatives as
 well. They teach what varies between objects of one kind; the answer
 still speaks of the meshes of the set alone. Relatives belong to folds. Every tree of the
 classifier sees all folds but one, so that a scene with the members of that one shows how well
@@ -58,14 +58,17 @@ Population = tuple[tuple[Relative, ...], ...]
 
 
 def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
-                 styles: Mapping[str, Sequence[int]] = TRAINING) -> Population:
+                 styles: Mapping[str, Sequence[int]] | None = TRAINING) -> Population:
     """
     Return the Population of the models; the same seed gives the same one for any `jobs`.
 
-    :param styles: of each family of the catalogue, those that take part.
+    :param styles: of each family of the catalogue, those that take part; None = the variants that
+        the set gives are the only relatives.
+    :return: () where nobody has a relative.
     """
     wanted = []
-    for index, model in enumerate(models):
+    for index, model in enumerate(models if styles is not None else ()):
+        assert styles is not None
         family = family_name(model.name)
         if family:
             wanted += [(index, style, n % FOLDS, draw)
@@ -84,13 +87,14 @@ def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
     solid = Parallel(n_jobs=jobs)(delayed(_pieces)(shape) for _, shape, _ in given)
     for (index, shape, fold), pieces in zip(given, solid):
         population[index].append(Relative(shape, pieces, fold))
-    return tuple(tuple(each) for each in population)
+    return tuple(tuple(each) for each in population) if any(population) else ()
 
 
 def _relative(model: GenericModel, style: int, fold: int, rng: np.random.Generator) -> Relative:
     """Return a Relative of a model: a style of its family, or a reshaped copy (-1)."""
     if style < 0:
-        moved = reshape(model.vertices, model.faces, rng, COPY_STRENGTH, model.symmetry)[0]
+        moved = reshape(model.vertices, model.faces, rng, COPY_STRENGTH, model.symmetry,
+                        structure=1.0)[0]
         mesh = trimesh.Trimesh(moved, model.faces, process=False)
     else:
         mesh = family_meshes(model, (style,), (rng,))[0]

@@ -24,9 +24,8 @@ if TYPE_CHECKING:
     from hooc_perception.synthesis.scatter import PlacedObject
 
 # Standard deviations between two objects of one kind, as logarithms of their sides: overall, and
-# per side. Over 200 public meshes of household objects spread by .2 to .3 in size within their
-# category, and by about .2 along each axis.
-SIZE_SPREAD = 0.14
+# per side. Household objects of one category vary in size by about 1 : 1.5.
+SIZE_SPREAD = 0.12
 ASPECT_SPREAD = 0.12
 TAPER_SPREAD = 0.08
 BEND_SPREAD = 0.012
@@ -50,7 +49,7 @@ class Warp:
     :ivar lattice: (4, 4, 4, 3) shifts of the control points, metres (free-form deformation
         after Sederberg & Parry 1986).
     :ivar knots: (3, KNOTS) where equally spaced cuts across each axis come to lie, as shares of
-        its side, 0 to 1.
+        its side, 0 to 1; None = the parts keep their proportions.
     :ivar girth: (KNOTS, 3) factor on each axis at the knots along `axis`.
     :ivar offset: (3,) subtracted at the end.
     """
@@ -62,7 +61,7 @@ class Warp:
     taper: Float64Array
     bend: Float64Array
     lattice: Float64Array
-    knots: Float64Array
+    knots: Float64Array | None
     girth: Float64Array
     offset: Float64Array
 
@@ -70,9 +69,11 @@ class Warp:
         """Return warped points (n, 3) float64 of model space."""
         middle = self.low + 0.5 * self.extents
         unit, even = (points - self.low) / self.extents, np.linspace(0, 1, KNOTS)
-        girth = np.column_stack([np.interp(unit[:, self.axis], even, g) for g in self.girth.T])
-        unit = np.column_stack([np.interp(u, even, k) for u, k in zip(unit.T, self.knots)])
-        points = (self.low + unit * self.extents - middle) * girth + middle
+        if self.knots is not None:
+            girth = np.column_stack([np.interp(unit[:, self.axis], even, g)
+                                     for g in self.girth.T])
+            unit = np.column_stack([np.interp(u, even, k) for u, k in zip(unit.T, self.knots)])
+            points = (self.low + unit * self.extents - middle) * girth + middle
         shift = np.zeros(points.shape)
         w = [_bernstein(unit[:, k]) for k in range(3)]
         for i in range(4):
@@ -85,13 +86,14 @@ class Warp:
 
 
 def random_warp(vertices: Float64Array, rng: np.random.Generator, strength: float = 1.0,
-                symmetry: AnyArray | None = None) -> Warp:
+                symmetry: AnyArray | None = None, structure: float = 0.0) -> Warp:
     """
     Return a Warp that puts the bounding-box centre of the moved `vertices` (V, 3) at 0.
 
     :param strength: 0 = none, 1 = as much as real objects differ.
     :param symmetry: (3,) axis orders as in GenericModel, or None. A round object stays round:
         the two axes across share their scale, and it is bent only a little.
+    :param structure: factor on `strength` for the lengths and girths of single parts.
     """
     low = vertices.min(axis=0)
     # Sheets have a side of length 0; a millimetre keeps the unit cube well defined.
@@ -111,29 +113,33 @@ def random_warp(vertices: Float64Array, rng: np.random.Generator, strength: floa
     bend[axis] = 0.0
     reach = 0.6 * extents + 0.1 * extents.max()
     lattice = LATTICE_SPREAD * strength * reach * _clipped(rng, (4, 4, 4, 3))
-    knots, girth = _structure(vertices, axis, rng, strength)
+    knots, girth = None, np.ones((KNOTS, 3))
+    if structure > 0:
+        knots, girth = _structure(vertices, axis, rng, strength * structure)
     if round_axes:
         taper *= 0.5 * (len(round_axes) == 1)
         if len(round_axes) == 1:
             taper[:] = taper.max() * (np.arange(3) != axis)
         bend, lattice = 0.2 * bend, 0.25 * lattice
-        knots, girth = _round(knots, girth, round_axes)
-        axis = round_axes[0]
+        if knots is not None:
+            axis = round_axes[0]
+            knots, girth = _round(knots, girth, round_axes)
     warp = Warp(low, extents, scale, axis, taper, bend, lattice, knots, girth, np.zeros(3))
     moved = warp(vertices)
     return replace(warp, offset=0.5 * (moved.min(axis=0) + moved.max(axis=0)))
 
 
 def reshape(vertices: Float64Array, faces: AnyArray, rng: np.random.Generator,
-            strength: float = 1.0, symmetry: AnyArray | None = None,
-            detail_loss: float = 0.3) -> tuple[Float64Array, Float64Array, Warp]:
+            strength: float = 1.0, symmetry: AnyArray | None = None, detail_loss: float = 0.3,
+            structure: float = 0.0) -> tuple[Float64Array, Float64Array, Warp]:
     """
     Return (vertices (V, 3) centred, extents (3,), Warp) of a random variant of a mesh.
 
     :param vertices: (V, 3) float64 in model axes, metres; `faces` (F, 3) stay valid.
     :param detail_loss: chance that fine detail is smoothed away, for meshes that have any.
+    :param structure: as in `random_warp`.
     """
-    warp = random_warp(vertices, rng, strength, symmetry)
+    warp = random_warp(vertices, rng, strength, symmetry, structure)
     moved = warp(np.asarray(vertices, np.float64))
     if strength > 0 and rng.random() < detail_loss and len(faces) > 600:
         mesh = trimesh.Trimesh(moved, faces, process=False)

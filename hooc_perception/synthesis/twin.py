@@ -6,9 +6,10 @@ A synthetic twin of the HOOC data set, made from the built-in catalogue.
 It follows section 5 of the paper: 25 categories, one object per category in a scene, 5 scenes
 of 10 and 4 of 20 objects that stand close together and on one another, three Kinect v2 around
 the table with lens distortion and small calibration errors, and a jug and a glass whose depth
-error differs in every view. Real objects differ from their generic models: here they are made
-from styles of the catalogue that training never sees. What the paper does not state (sizes of
-table and room, heights of the cameras) is set to values that are plausible for a laboratory.
+error differs in every view. Real objects differ from their generic models: here they are reshaped
+copies or, with `families`, made from styles of the catalogue that training never sees. What the
+paper does not state (sizes of table and room, heights of the cameras) is set to values that are
+plausible for a laboratory.
 """
 
 from collections.abc import Iterator, Sequence
@@ -67,8 +68,8 @@ class TwinOptions:
     scenes: tuple[str, ...] = ()
     cameras: int = 3
     repeat: bool = False
-    strength: float = 0.7
-    families: bool = True
+    strength: float = 1.0
+    families: bool = False
 
     def __post_init__(self) -> None:
         """Raise HoocError, naming the option, if a value is out of range."""

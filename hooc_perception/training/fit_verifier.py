@@ -3,9 +3,9 @@
 """
 Learn to verify candidates (core/parsing/verifier.py) from parsed synthetic scenes.
 
-All objects of a scene are made from shapes of one fold, and only those trees of the classifier
-that have never seen this fold take part: on shapes that it knows a classifier looks better than
-it is.
+The scenes are not those that the classifier was trained on. Where there are relatives, all
+objects of a scene are made from those of one fold, and only the trees that have never seen this
+fold take part: on shapes that it knows a classifier looks better than it is.
 """
 
 from collections.abc import Callable
@@ -57,7 +57,8 @@ class _Scenes:
     """
     Synthetic scenes, parsed by the chain that the verifier is for.
 
-    :ivar parsers: for each fold, with the trees that have not seen it.
+    :ivar parsers: for each fold, with the trees that have not seen it; one where there are no
+        relatives.
     :ivar base: what the scenes look like, before rig and deformation are drawn.
     """
 
@@ -92,7 +93,7 @@ class _Scenes:
         x = features(search)
         right = np.zeros(len(x), np.uint8)
         for o in scene.objects:
-            reach = config.right_within * o.size.max()
+            reach = config.right_within * parser.models[o.category - 1].longest_side
             right |= ((search.pool.category == o.category)
                       & (np.linalg.norm(search.pool.translation - o.translation, axis=1) < reach))
         return x, right
@@ -109,9 +110,10 @@ def verifier_table(context: TrainingContext, config: VerifierConfig,
     fused = next((c for c in context.configs if isinstance(c, FusedScenesConfig)),
                  FusedScenesConfig())
     limit = context.max_instances
+    judges = ([unaware_of(context.classifier, fold, 'forest_') for fold in range(FOLDS)]
+              if context.population else [context.classifier])
     scenes = _Scenes(
-        tuple(Parser(context.models, unaware_of(context.classifier, fold, 'forest_'),
-                     profile(context.profile), limit) for fold in range(FOLDS)),
+        tuple(Parser(context.models, judge, profile(context.profile), limit) for judge in judges),
         context.population, context.cameras, config, scene_config(fused, min(limit, 4) or 3),
         context.seed)
     parts = []

@@ -47,11 +47,11 @@ class FusedScenesConfig(Config):
     random_rigs: float = param(0.3, 'Share of scenes seen by a random rig of one to four cameras '
                                'instead of the given one, moved a little; they keep the forest '
                                'usable on any rig.', '', 0.0, 1.0)
-    reshape_low: float = param(0.4, 'Smallest deviation of the objects of a scene from the '
+    reshape_low: float = param(0.5, 'Smallest deviation of the objects of a scene from the '
                                'generic meshes; 1 = as real objects.', '', 0.0, 3.0)
-    reshape_high: float = param(1.5, 'Largest deviation; scenes draw uniformly in between.', '',
+    reshape_high: float = param(1.8, 'Largest deviation; scenes draw uniformly in between.', '',
                                 0.0, 3.0)
-    relatives: bool = param(True, 'Whether objects are also made from the families of the '
+    relatives: bool = param(False, 'Whether objects are also made from the families of the '
                             'built-in catalogue that bear the names of the categories, or, where '
                             'there is none, from strongly reshaped copies.')
     translucent: float = param(0.08, 'Share of objects with the depth error of glass.', '', 0.0,

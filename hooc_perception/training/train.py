@@ -20,6 +20,7 @@ from hooc_perception.core.config import Config
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.errors import HoocError
+from hooc_perception.objects.catalogue import TRAINING
 from hooc_perception.objects.derive import derive
 from hooc_perception.objects.mesh import load_mesh
 from hooc_perception.synthesis.population import relatives_of
@@ -37,10 +38,17 @@ from tqdm import tqdm
 T = TypeVar('T')
 PROFILES: dict[str, tuple[Config, ...]] = {
     'paper': (fit_pixels.PixelFitConfig(),),
-    'best': (FusedScenesConfig(), FitConfig(trees=60), VerifierConfig()),
+    'best': (FusedScenesConfig(), FitConfig(), VerifierConfig()),
     'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24),
              VerifierConfig(verifier_scenes=30)),
 }
+
+
+# What changes where training makes objects from relatives as well: the shapes differ by
+# themselves, and every tree sees two thirds of them.
+WITH_RELATIVES: dict[type[Config], dict[str, Any]] = {
+    FusedScenesConfig: {'relatives': True, 'reshape_low': 0.4, 'reshape_high': 1.5},
+    FitConfig: {'trees': 60}}
 
 
 class TrainedCategory(Protocol):
@@ -122,6 +130,22 @@ def train(scene_set: TrainingSet, out: str | Path, profile: str = 'best', seed: 
                              scene_set.cameras, scene_set.max_instances)
 
 
+def configs_of(profile: str, relatives: bool = False) -> tuple[Config, ...]:
+    """
+    Return the Config objects by which a profile is trained.
+
+    :param relatives: whether objects are also made from the built-in catalogue's families.
+    :raises HoocError: where the profile knows no relatives.
+    """
+    configs = PROFILES[profile]
+    if not relatives:
+        return configs
+    if not any(isinstance(c, FusedScenesConfig) for c in configs):
+        raise HoocError(f'profile {profile} is trained on the generic meshes alone; leave out '
+                        '--relatives or choose another profile')
+    return tuple(c.changed(WITH_RELATIVES.get(type(c), {})) for c in configs)
+
+
 def generic_models(scene_set: TrainingSet, seed: int,
                    progress: bool = False) -> tuple[GenericModel, ...]:
     """Return the generic models of a set's categories with their variants, in class order."""
@@ -143,8 +167,9 @@ def train_classifier(models: Sequence[GenericModel], cameras: Sequence[Camera],
     """Return the classifier's dict of arrays, from a step for each of the configs."""
     configs = tuple(configs or PROFILES[profile])
     jobs = jobs or joblib.cpu_count()
-    fused = any(isinstance(c, FusedScenesConfig) and c.relatives for c in configs)
-    context = TrainingContext(tuple(models), relatives_of(models, seed, jobs) if fused else (),
+    wide = any(isinstance(c, FusedScenesConfig) and c.relatives for c in configs)
+    context = TrainingContext(tuple(models),
+                              relatives_of(models, seed, jobs, TRAINING if wide else None),
                               tuple(cameras), max_instances, profile, seed, configs, jobs,
                               progress, {})
     for config in configs:

@@ -5,11 +5,10 @@ The shapes from which the objects of training scenes are made.
 
 A category is more than one mesh. Its relatives take part in training beside the generic mesh: the
 variants that the set gives and, where training asks for them, members of the built-in catalogue's
-family of the same name, or strongly reshaped copies where there is none. Further meshes of a category that the set gives are relatives as
-well. They teach what varies between objects of one kind; the answer
-still speaks of the meshes of the set alone. Relatives belong to folds. Every tree of the
-classifier sees all folds but one, so that a scene with the members of that one shows how well
-the tree does on shapes that it has never seen.
+family of the same name, or strongly reshaped copies where there is none. They teach what varies
+between objects of one kind; the answer still speaks of the meshes of the set alone. Relatives
+belong to folds. Every tree of the classifier sees all folds but one, so that a scene with the
+members of that one shows how well the tree does on shapes that it has never seen.
 """
 
 from collections.abc import Mapping, Sequence

@@ -67,7 +67,7 @@ def scoring_models(scene_set: SceneSet, seed: int = 0,
     time of deriving everything.
 
     :param trained: the models that the results were found with. Their variants take the place of
-        the set's own, which lack those of the built-in catalogue.
+        the set's own.
     """
     out, known = {}, {model.name: model.variants for model in trained}
     for category in scene_set.categories:

@@ -68,8 +68,8 @@ def shape_of(thing: PosedObject, models: Mapping[str, GenericModel]) -> GenericM
     """
     Return the mesh with which an object was found.
 
-    :param models: mapping category name -> GenericModel. Those of a scene set lack the meshes
-        that training takes from the built-in catalogue; the generic mesh takes their place.
+    :param models: mapping category name -> GenericModel. Where they lack the mesh, the generic
+        mesh takes its place.
     """
     return models[thing.category].members[member_of(thing, models)]
 

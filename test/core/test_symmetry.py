@@ -75,7 +75,9 @@ def test_half_turns_are_those_that_a_symmetry_does_not_hide():
     q = Rotation.from_euler('xyz', [[0.3, 0.2, 0.1], [1.0, 0.5, 2.0], [0.1, 0.7, 0.3]]).as_quat()
     objects = Candidates(np.array([1, 2, 3], np.uint8), np.eye(3), q, np.ones((3, 3)),
                          np.array([.1, .2, .3], np.float32))
-    turned, rows = half_turns(objects, (cup, spoon, box))
+    # Families of one member each.
+    models = tuple(SimpleNamespace(members=(shape,)) for shape in (cup, spoon, box))
+    turned, rows = half_turns(objects, models)
     assert rows.tolist() == [0, 0, 1, 1, 1] and turned.category.tolist() == [1, 1, 2, 2, 2]
     np.testing.assert_array_equal(turned.translation, objects.translation[rows])
     apart = (Rotation.from_quat(turned.rotation_xyzw) * Rotation.from_quat(q[rows]).inv())

@@ -82,5 +82,5 @@ def test_half_turns_are_those_that_a_symmetry_does_not_hide():
     np.testing.assert_array_equal(turned.translation, objects.translation[rows])
     apart = (Rotation.from_quat(turned.rotation_xyzw) * Rotation.from_quat(q[rows]).inv())
     np.testing.assert_allclose(apart.magnitude(), np.pi, atol=1e-6)
-    none, rows = half_turns(objects.take(np.array([2])), (cup, spoon, box))
+    none, rows = half_turns(objects.take(np.array([2])), models)
     assert len(none) == 0 and rows.shape == (0,) and none.rotation_xyzw.shape == (0, 4)

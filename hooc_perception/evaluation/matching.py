@@ -50,7 +50,7 @@ def posed(thing: Any) -> PosedObject:
                            np.asarray(get('size'), np.float64).reshape(3),
                            1.0 if score is None else float(score),
                            *(float('nan') if sigma is None else float(sigma)
-                             for sigma in sigmas), int(get('member') or 0))
+                             for sigma in sigmas), member=int(get('member') or 0))
     except (TypeError, ValueError) as error:
         raise HoocError(f'object {get("category")!r} has no usable pose: {error}; give '
                         'translation (3), rotation_xyzw (4) and size (3)') from None

@@ -13,6 +13,7 @@ members of that one shows how well the tree does on shapes that it has never see
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import stage_rng
@@ -84,7 +85,7 @@ def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
     for (index, *_), relative in zip(wanted, made):
         population[index].append(relative)
     solid = Parallel(n_jobs=jobs)(delayed(_pieces)(shape) for _, shape, _ in given)
-    for (index, shape, fold), pieces in zip(given, solid):
+    for (index, shape, fold), pieces in zip(given, cast(list[list[Float64Array]], solid)):
         population[index].append(Relative(shape, pieces, fold))
     return tuple(tuple(each) for each in population) if any(population) else ()
 

@@ -158,7 +158,8 @@ def _raw_group(source: _Source, start: int, stop: int, probes: Float64Array) -> 
 def _binned_group(source: _Source, start: int, stop: int, probes: Float64Array,
                   cuts: Float32Array) -> list[tuple[UInt8Array, UInt8Array, Int8Array]]:
     """Return (quantised x, y, fold) of the scenes start .. stop - 1."""
-    return [(quantise(x, cuts), *rest) for x, *rest in _raw_group(source, start, stop, probes)]
+    return [(quantise(x, cuts), y, fold)
+            for x, y, fold in _raw_group(source, start, stop, probes)]
 
 
 def fused_table(context: TrainingContext, config: FusedScenesConfig,
@@ -187,9 +188,10 @@ def fused_table(context: TrainingContext, config: FusedScenesConfig,
         raw = scenes(_raw_group, 0, first, probes)
         cuts = thresholds(np.concatenate([x for x, *_ in raw]), config.bins,
                           stage_rng(seed, 'thresholds'))
-        parts = [(quantise(x, cuts), *rest) for x, *rest in raw]
+        parts = [(quantise(x, cuts), y, fold) for x, y, fold in raw]
         parts.extend(scenes(_binned_group, first, config.scenes, probes, cuts))
-    y, fold = (np.concatenate([part[k] for part in parts]) for k in (1, 2))
+    y = np.concatenate([y for _, y, _ in parts])
+    fold: Int8Array = np.concatenate([fold for *_, fold in parts])
     scene = np.repeat(np.arange(len(parts), dtype=np.int32), [len(y) for _, y, _ in parts])
     return FusedTable(np.concatenate([x for x, *_ in parts], axis=1), cuts, y, fold, scene,
                       probes)

@@ -37,7 +37,8 @@ def smooth(points: npt.ArrayLike, count: int) -> Float64Array:
     x = np.linspace(points[0, 0], points[-1, 0], count)
     x = np.unique(np.round(np.concatenate([x, points[:, 0]]), 5))
     x = np.clip(x[np.append(True, np.diff(x) > 1e-4)], points[0, 0], points[-1, 0])
-    return np.column_stack([x, PchipInterpolator(points[:, 0], points[:, 1:])(x)])
+    return np.asarray(np.column_stack([x, PchipInterpolator(points[:, 0], points[:, 1:])(x)]),
+                      np.float64)
 
 
 def bar(points: Sequence[Sequence[float]], count: int = 12, sides: int = 12) -> Manifold:

@@ -248,7 +248,7 @@ def compare_one(hypotheses: Hypotheses, k: int, h: Float64Array, target: Target,
     :return: where the next one would go.
     """
     meshes, views = target.meshes, target.views
-    s = hypotheses.shape[k]
+    s: int = hypotheses.shape[k]
     vertices = meshes.vertices[meshes.vertex_start[s]:meshes.vertex_start[s + 1]]
     faces = meshes.faces[meshes.face_start[s]:meshes.face_start[s + 1]]
     R, world = np.empty((3, 3)), np.empty(vertices.shape)

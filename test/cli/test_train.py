@@ -6,13 +6,14 @@ from types import SimpleNamespace
 
 from hooc_perception.cli import main as cli
 from hooc_perception.objects.catalogue import CATALOGUE, write_catalogue
+from hooc_perception.training.train import PROFILES
 
 
 def test_a_set_without_any_scene_can_be_trained_on(tmp_path, monkeypatch, capsys):
     given = {}
 
-    def train(scene_set, out, profile, seed, jobs):
-        given.update(scene_set=scene_set, out=out)
+    def train(scene_set, out, profile, seed, jobs, configs):
+        given.update(scene_set=scene_set, out=out, configs=configs)
         return SimpleNamespace(path=out, models=scene_set.categories, profile=profile)
 
     monkeypatch.setattr('hooc_perception.training.train.train', train)
@@ -21,6 +22,12 @@ def test_a_set_without_any_scene_can_be_trained_on(tmp_path, monkeypatch, capsys
     assert cli.main(['train', str(tmp_path / 'set'), '--out', str(tmp_path / 'm')]) == 0
     assert given['scene_set'].scenes == () and len(given['scene_set'].cameras) == 3
     assert f'{len(CATALOGUE)} categories' in capsys.readouterr().out
+    assert given['configs'] == PROFILES['best']
+    words = ['train', str(tmp_path / 'set'), '--out', str(tmp_path / 'm'), '--relatives']
+    assert cli.main(words) == 0
+    assert given['configs'][0].relatives and given['configs'][1].trees == 60
+    assert cli.main([*words, '--profile', 'paper']) == 1
+    assert 'leave out --relatives' in capsys.readouterr().err
 
 
 def sentence(capsys):

@@ -52,27 +52,6 @@ def link(distributions, site):
                 target.symlink_to(Path(one.locate_file(top)).resolve())
 
 
-def lend_kernels(package):
-    """
-    Give an installed package the kernels that this tree has compiled, where it has any.
-
-    Compiling them all takes minutes, and other tests do it. numba takes them for its own as the
-    sources are the same; whatever differs is compiled anew. Those that all stages share are
-    compiled here: that has to work without the extras, too.
-    """
-    ours = ROOT / 'hooc_perception'
-    for path in (*ours.rglob('*.nb[ic]'), *ours.glob('__pycache__/*.sources')):
-        if path.is_relative_to(ours / 'core' / 'kernels'):
-            continue
-        target = package / path.relative_to(ours)
-        target.parent.mkdir(exist_ok=True)
-        shutil.copyfile(path, target)
-    for path in ours.rglob('kernels/*.py'):
-        state, target = path.stat(), package / path.relative_to(ours)
-        if target.exists():
-            os.utime(target, ns=(state.st_atime_ns, state.st_mtime_ns))
-
-
 @pytest.fixture(scope='module')
 def prefix(tmp_path_factory):
     """Return an environment with the plain dependencies and the wheel of this tree."""
@@ -96,7 +75,6 @@ def prefix(tmp_path_factory):
     project = tomllib.loads((ROOT / 'pyproject.toml').read_text())['project']
     site, = (prefix / 'lib').glob('python*/site-packages')
     link(closure(project['dependencies']), site)
-    lend_kernels(site / 'hooc_perception')
     return prefix
 
 

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 from hooc_perception.core.arrays import Float64Array, Int32Array
 from hooc_perception.core.memo import latest
 from hooc_perception.core.types import GenericModel
-from hooc_perception.objects.repair import closed
-from hooc_perception.synthesis.convex import convex_pieces
+from hooc_perception.synthesis.convex import pieces_of
 from hooc_perception.synthesis.population import Population, Relative
 from hooc_perception.synthesis.reshape import reshape
 from hooc_perception.synthesis.scatter import models_key
 import numpy as np
-import trimesh
 
 # Share of the objects that are made from the set's own mesh where there are relatives.
 GENERIC_SHARE = 0.5
@@ -58,9 +56,7 @@ class BodyMaker:
     def pieces(self, index: int) -> list[Float64Array]:
         """Return the cached convex pieces of models[index]."""
         if index not in self._pieces:
-            model = self.models[index]
-            solid = closed(trimesh.Trimesh(model.vertices, model.faces, process=False))
-            self._pieces[index] = convex_pieces(solid)
+            self._pieces[index] = pieces_of(self.models[index])
         return self._pieces[index]
 
     def body(self, category: int, rng: np.random.Generator, strength: float = 0.0,
@@ -76,12 +72,11 @@ class BodyMaker:
         :param generic_share: how often the generic model is taken although there are relatives.
         """
         relative = self._relative(category, rng, fold, generic_share)
-        if relative is not None:
-            strength *= RELATIVE_STRENGTH
         if relative is None:
             model, pieces, own = self.models[category - 1], self.pieces(category - 1), -1
         else:
             model, pieces, own = relative.model, relative.pieces, relative.fold
+            strength *= RELATIVE_STRENGTH
         if strength <= 0:
             return Body(category, model.vertices, model.faces, pieces, model.rest_rotations, own)
         vertices, _, warp = reshape(model.vertices, model.faces, rng, strength,

@@ -3,6 +3,8 @@
 """Cut a mesh into convex pieces for physics, by planes that minimise the air in the hulls."""
 
 from hooc_perception.core.arrays import Float64Array
+from hooc_perception.core.types import GenericModel
+from hooc_perception.objects.repair import closed
 import manifold3d
 import numpy as np
 import trimesh
@@ -42,6 +44,11 @@ def convex_pieces(solid: trimesh.Trimesh, max_pieces: int = MAX_PIECES) -> list[
     pieces = [np.asarray(p.hull.to_mesh().vert_properties[:, :3], np.float64)
               for p in done + open_pieces]
     return [p for p in pieces if len(p) >= 4]
+
+
+def pieces_of(model: GenericModel) -> list[Float64Array]:
+    """Return the `convex_pieces` of a model, made a solid first where its mesh is open."""
+    return convex_pieces(closed(trimesh.Trimesh(model.vertices, model.faces, process=False)))
 
 
 class _Piece:

@@ -21,8 +21,7 @@ from hooc_perception.core.types import GenericModel
 from hooc_perception.objects.catalogue import family_name, TRAINING
 from hooc_perception.objects.derive import derive
 from hooc_perception.objects.family import family_meshes
-from hooc_perception.objects.repair import closed
-from hooc_perception.synthesis.convex import convex_pieces
+from hooc_perception.synthesis.convex import pieces_of
 from hooc_perception.synthesis.reshape import reshape
 from joblib import delayed, Parallel
 import numpy as np
@@ -64,44 +63,38 @@ def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
 
     :param styles: of each family of the catalogue, those that take part; None = the variants that
         the set gives are the only relatives.
-    :return: () where nobody has a relative.
+    :return: () where no category has a relative.
     """
-    wanted = []
-    for index, model in enumerate(models if styles is not None else ()):
-        assert styles is not None
-        family = family_name(model.name)
-        if family:
-            wanted += [(index, style, n % FOLDS, draw)
-                       for n, style in enumerate(styles[family]) for draw in range(DRAWS)]
-        else:
-            wanted += [(index, -1, copy % FOLDS, copy) for copy in range(COPIES)]
-    given = [(index, shape, k % FOLDS) for index, model in enumerate(models)
-             for k, shape in enumerate(model.variants)]
-    made = Parallel(n_jobs=jobs)(
-        delayed(_relative)(models[index], style, fold,
-                           stage_rng(seed, 'relatives', index, style + 1, draw))
-        for index, style, fold, draw in wanted)
-    population: list[list[Relative]] = [[] for _ in models]
-    for (index, *_), relative in zip(wanted, made):
-        population[index].append(relative)
-    solid = Parallel(n_jobs=jobs)(delayed(_pieces)(shape) for _, shape, _ in given)
-    for (index, shape, fold), pieces in zip(given, cast(list[list[Float64Array]], solid)):
-        population[index].append(Relative(shape, pieces, fold))
-    return tuple(tuple(each) for each in population) if any(population) else ()
+    population = cast(list[tuple[Relative, ...]], Parallel(n_jobs=jobs)(
+        delayed(_relatives)(model, index, seed, styles) for index, model in enumerate(models)))
+    return tuple(population) if any(population) else ()
 
 
-def _relative(model: GenericModel, style: int, fold: int, rng: np.random.Generator) -> Relative:
-    """Return a Relative of a model: a style of its family, or a reshaped copy (-1)."""
-    if style < 0:
-        moved = reshape(model.vertices, model.faces, rng, COPY_STRENGTH, model.symmetry,
-                        structure=1.0)[0]
-        mesh = trimesh.Trimesh(moved, model.faces, process=False)
-    else:
-        mesh = family_meshes(model, (style,), (rng,))[0]
-    shape = derive(model.name, mesh, rng, SURFACE_POINTS, INTERIOR_POINTS)
-    return Relative(shape, _pieces(shape), fold)
+def _relatives(model: GenericModel, index: int, seed: int,
+               styles: Mapping[str, Sequence[int]] | None) -> tuple[Relative, ...]:
+    """Return the relatives of the `index`-th model."""
+    made = []
+    family = family_name(model.name)
+    if styles is not None and family:
+        draws = [(style, n % FOLDS, stage_rng(seed, 'relatives', index, style + 1, draw))
+                 for n, style in enumerate(styles[family]) for draw in range(DRAWS)]
+        meshes = family_meshes(model, [d[0] for d in draws], [d[2] for d in draws])
+        made = [(_derived(model.name, mesh, rng), fold)
+                for mesh, (_, fold, rng) in zip(meshes, draws)]
+    elif styles is not None:
+        made = [(_copy(model, stage_rng(seed, 'relatives', index, 0, k)), k % FOLDS)
+                for k in range(COPIES)]
+    made += [(variant, k % FOLDS) for k, variant in enumerate(model.variants)]
+    return tuple(Relative(shape, pieces_of(shape), fold) for shape, fold in made)
 
 
-def _pieces(shape: GenericModel) -> list[Float64Array]:
-    """Return the convex vertex sets (n, 3) that cover a mesh."""
-    return convex_pieces(closed(trimesh.Trimesh(shape.vertices, shape.faces, process=False)))
+def _copy(model: GenericModel, rng: np.random.Generator) -> GenericModel:
+    """Return a strongly reshaped copy of a model."""
+    moved = reshape(model.vertices, model.faces, rng, COPY_STRENGTH, model.symmetry,
+                    structure=1.0)[0]
+    return _derived(model.name, trimesh.Trimesh(moved, model.faces, process=False), rng)
+
+
+def _derived(name: str, mesh: trimesh.Trimesh, rng: np.random.Generator) -> GenericModel:
+    """Return the GenericModel of a relative's mesh."""
+    return derive(name, mesh, rng, SURFACE_POINTS, INTERIOR_POINTS)

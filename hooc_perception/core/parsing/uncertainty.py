@@ -60,7 +60,8 @@ def pose_uncertainty(frame: Frame, parsed: ParsedScene, pixels: PixelCosts,
         return np.zeros((2, 0), np.float32)
     models = frame.models
     cost = _Cost(frame.coarse, objects, models, pixels, costs)
-    longest = np.array([shape.longest_side for shape in objects.shapes(models)])
+    shapes = objects.shapes(models)
+    longest = np.array([shape.longest_side for shape in shapes])
     information = _information(cost, longest)
     flipped = _flip_probabilities(cost, objects, models, rng)
     out = np.full((2, n), np.nan, np.float32)
@@ -73,7 +74,7 @@ def pose_uncertainty(frame: Frame, parsed: ParsedScene, pixels: PixelCosts,
         # Errors spread wider than least squares think: sigma goes with the variance.
         variance = np.trace(covariance[:3, :3]) + (SHAPE * longest[k]) ** 2
         out[0, k] = min(PER_SQUARE_M * variance, longest[k])
-        symmetry = models[int(objects.category[k]) - 1].members[int(objects.member[k])].symmetry
+        symmetry = shapes[k].symmetry
         if is_ball(symmetry):
             continue
         turning = covariance[3:6, 3:6]

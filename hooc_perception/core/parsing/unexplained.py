@@ -23,8 +23,7 @@ def unexplained_points(observation: Observation, objects: Candidates,
     :param models: tuple of GenericModel; class id c is models[c - 1].
     """
     meshes = []
-    for i in range(len(objects)):
-        model = models[int(objects.category[i]) - 1].members[int(objects.member[i])]
+    for i, model in enumerate(objects.shapes(models)):
         meshes.append((posed_vertices(model, objects.translation[i], objects.rotation_xyzw[i],
                                       objects.size[i]), model.faces))
     left = []

@@ -17,7 +17,6 @@ import numpy as np
 import numpy.typing as npt
 
 ROUND = 32
-_Pair = tuple[float, float]
 
 
 def superellipse(aspect: float = 1.0, power: float = 2.0, count: int = ROUND) -> Float64Array:

@@ -17,6 +17,8 @@ import yaml
 
 # Allowed numbers of coefficients per distortion model; shorter ones are padded with zeros.
 COEFFICIENTS = {'plumb_bob': (4, 5), 'rational_polynomial': (8,)}
+# `sensor` names the kind of the camera, such as kinect_v2; nobody reads it yet.
+KEYS = ('width', 'height', 'distortion_model', 'K', 'D', 'world_from_camera', 'sensor')
 # Quaternions rounded to three decimals pass; quaternions that were never normalised do not.
 QUATERNION_TOLERANCE = 1e-3
 
@@ -102,12 +104,14 @@ def distortion(value: object, model: Any, where: str) -> Float64Array:
 
 def _camera(name: str, entry: object, where: str) -> Camera:
     """Return the Camera of one entry of cameras.yaml."""
-    entry = fields.mapping(entry, where)
+    entry = fields.closed(fields.mapping(entry, where), KEYS, where)
     width, height = (fields.integer(fields.required(entry, side, where), 1, fields.MAX_SIDE,
                                     f'{where} {side}') for side in ('width', 'height'))
     model = entry.get('distortion_model', 'plumb_bob')
-    translation, quaternion = pose(fields.required(entry, 'world_from_camera', where),
-                                   f'{where} world_from_camera:')
+    placed = fields.mapping(fields.required(entry, 'world_from_camera', where),
+                            f'{where} world_from_camera:')
+    fields.closed(placed, ('translation', 'rotation_xyzw'), f'{where} world_from_camera:')
+    translation, quaternion = pose(placed, f'{where} world_from_camera:')
     return Camera(name, width, height,
                   intrinsics(fields.required(entry, 'K', where), width, height, f'{where} K'),
                   distortion(entry.get('D', []), model, where),

@@ -6,7 +6,8 @@ Check the fields of parsed YAML and JSON of unknown origin.
 In every function, `where` names file and field at the beginning of the error sentence.
 """
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
+import difflib
 import math
 import re
 import reprlib
@@ -18,6 +19,17 @@ import numpy as np
 
 # Largest width or height of an image, pixels.
 MAX_SIDE = 8192
+# Keys with this prefix are the user's own notes, in every file.
+OWN_PREFIX = 'x_'
+# What other formats call our keys.
+_SYNONYMS = {
+    'orientation': 'rotation_xyzw', 'quaternion': 'rotation_xyzw', 'rotation': 'rotation_xyzw',
+    'position': 'translation', 'extents': 'size', 'dimensions': 'size',
+    'pose': 'world_from_camera', 'extrinsics': 'world_from_camera', 'intrinsics': 'K',
+    'camera_matrix': 'K', 'distortion': 'D', 'distortion_coefficients': 'D', 'unit': 'scale',
+    'units': 'scale', 'mesh': 'model', 'meshes': 'models', 'label': 'category',
+    'class': 'category', 'visibility': 'surface_visibility', 'depth_scale': 'depth_unit',
+    'objects': 'categories', 'frame': 'world_frame'}
 _NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9_.\-]*\Z')
 _ROS_TOKEN = re.compile(r'[A-Za-z][A-Za-z0-9_]*\Z')
 
@@ -34,6 +46,35 @@ def sequence(value: object, where: str) -> list[Any]:
     if not isinstance(value, list):
         raise HoocError(f'{where} holds {_kind(value)}; give a list')
     return value
+
+
+def closed(entry: dict[str, Any], known: Collection[str], where: str) -> dict[str, Any]:
+    """
+    Return `entry` if it has no other keys than the known ones and the user's own (`x_...`).
+
+    A key that nobody reads is a spelling mistake more often than a note: `d` for `D` would drop
+    the distortion of a lens.
+    """
+    for key in entry:
+        if key in known or isinstance(key, str) and key.startswith(OWN_PREFIX):
+            continue
+        near = nearest(key, [name for name in known if name not in entry]) or nearest(key, known)
+        fix = (f'is {near} meant?' if near else f'remove it (known: {", ".join(known)}), or name '
+               f'it {OWN_PREFIX}{str(key)[:40]} if it is a note of your own')
+        raise HoocError(f'{where} {short_repr(key)} is not a key of this entry; {fix}')
+    return entry
+
+
+def nearest(key: object, names: Collection[str]) -> str | None:
+    """Return the name that a misspelt key most likely stands for, None if none is similar."""
+    text = str(key).lower()
+    if _SYNONYMS.get(text) in names:
+        return _SYNONYMS[text]
+    by_case = {name.lower(): name for name in names}
+    if text in by_case:
+        return by_case[text]
+    near = difflib.get_close_matches(text, by_case, 1, 0.6)
+    return by_case[near[0]] if near else None
 
 
 def required(entry: dict[str, Any], key: str, where: str) -> Any:

@@ -11,17 +11,19 @@ from contextlib import contextmanager
 import json
 import os
 from pathlib import Path
+import re
 import tempfile
 from typing import Any
 
 from hooc_perception.errors import HoocError
-from hooc_perception.io.scenes.fields import mapping, short_repr
+from hooc_perception.io.scenes.fields import mapping, sequence, short_repr
 import yaml
 
 MAX_YAML_BYTES = 8 << 20
 MAX_YAML_DEPTH = 32
 # BOP's scene_gt.json of a thousand images has some ten megabytes.
 MAX_JSON_BYTES = 64 << 20
+_LAST_MARK = re.compile(rb'\n---\s*\Z')
 _LOADER = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 
 
@@ -41,11 +43,28 @@ def read_bytes(path: str | Path, limit: int) -> bytes:
 
 
 def read_yaml(path: str | Path) -> dict[str, Any]:
-    """Return the mapping in a YAML file; tags that construct objects are rejected."""
+    """
+    Return the mapping in a YAML file.
+
+    Tags that construct objects are rejected, and so are keys that stand twice in one mapping,
+    of which YAML would silently keep the last.
+    """
+    return mapping(_yaml_content(path), f'{path}:')
+
+
+def read_yaml_list(path: str | Path) -> list[Any]:
+    """Return the list in a YAML file; HoocError as `read_yaml`."""
+    return sequence(_yaml_content(path), f'{path}:')
+
+
+def _yaml_content(path: str | Path) -> Any:
+    """Return what a YAML file holds."""
     data = read_bytes(path, MAX_YAML_BYTES)
     try:
-        _check_depth(data, path)
-        content = yaml.load(data, Loader=_LOADER)
+        # `ros2 topic echo --once` ends its only document with the mark of another.
+        data = _LAST_MARK.sub(b'\n', data)
+        _check_events(data, path)
+        return yaml.load(data, Loader=_LOADER)
     except HoocError:
         raise
     # Besides YAMLError, PyYAML lets through whatever a malformed scalar causes.
@@ -53,7 +72,6 @@ def read_yaml(path: str | Path) -> dict[str, Any]:
         mark = getattr(error, 'problem_mark', None)
         where = f' at line {mark.line + 1}' if mark else ''
         raise HoocError(f'{path}: not valid YAML{where}; correct the syntax there') from None
-    return mapping(content, f'{path}:')
 
 
 def read_json(path: str | Path) -> dict[str, Any]:
@@ -114,12 +132,28 @@ def file_inside(root: str | Path, relative: object, where: str) -> Path:
     return path
 
 
-def _check_depth(data: bytes, path: str | Path) -> None:
-    """Reject deeply nested YAML: libyaml's composer would overflow the stack and crash."""
-    depth = 0
+def _check_events(data: bytes, path: str | Path) -> None:
+    """Reject doubled keys, and nesting so deep that libyaml's composer would crash."""
+    # Of each open collection: the keys so far and whether a key comes next; None for a list.
+    stack: list[tuple[set[str], list[bool]] | None] = []
     for event in yaml.parse(data, Loader=_LOADER):
-        depth += isinstance(event, yaml.CollectionStartEvent)
-        depth -= isinstance(event, yaml.CollectionEndEvent)
-        if depth > MAX_YAML_DEPTH:
-            raise HoocError(f'{path}: nested more than {MAX_YAML_DEPTH} levels deep at line '
-                            f'{event.start_mark.line + 1}; check that this is the right file')
+        if isinstance(event, yaml.CollectionEndEvent):
+            stack.pop()
+            continue
+        if not isinstance(event, yaml.NodeEvent):
+            continue
+        line = event.start_mark.line + 1
+        if stack and stack[-1] is not None:
+            keys, key_next = stack[-1]
+            if key_next[0] and isinstance(event, yaml.ScalarEvent):
+                # Any number of merges is allowed.
+                if event.value in keys and event.value != '<<':
+                    raise HoocError(f'{path}: the key {short_repr(event.value)} stands twice in '
+                                    f'one entry, again at line {line}; keep one of the two')
+                keys.add(event.value)
+            key_next[0] = not key_next[0]
+        if isinstance(event, yaml.CollectionStartEvent):
+            stack.append((set(), [True]) if isinstance(event, yaml.MappingStartEvent) else None)
+            if len(stack) > MAX_YAML_DEPTH:
+                raise HoocError(f'{path}: nested more than {MAX_YAML_DEPTH} levels deep at line '
+                                f'{line}; check that this is the right file')

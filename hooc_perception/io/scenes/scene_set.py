@@ -10,7 +10,7 @@ from typing import Any
 from hooc_perception.chain import check_categories
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
-from hooc_perception.io.scenes import camera_files, fields, files
+from hooc_perception.io.scenes import annotations, camera_files, fields, files
 from hooc_perception.io.scenes.bop import is_bop, load_bop
 from hooc_perception.io.scenes.nominal_table import nominal_cameras
 from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
@@ -19,6 +19,9 @@ from hooc_perception.io.scenes.writer import FORMAT, NewScene, write_scene_set
 
 # Class ids and instance labels travel as 8-bit images in which 0 is the background.
 MAX_CATEGORIES = 255
+KEYS = ('format', 'name', 'world_frame', 'depth_unit', 'cameras', 'max_instances_per_category',
+        'categories')
+CATEGORY_KEYS = ('name', 'model', 'models', 'scale')
 # Meshes of one category.
 MAX_MESHES = 100
 # The world_frame of sets whose poses are not in a table's frame.
@@ -94,6 +97,7 @@ def _load_hooc(path: Path, with_scenes: bool) -> SceneSet:
     if fields.required(entry, 'format', f'{file}:') != FORMAT:
         raise HoocError(f'{file}: format is {fields.short_repr(entry["format"])}; this version '
                         f'reads {FORMAT!r}, so convert the set or correct the field')
+    fields.closed(entry, KEYS, f'{file}:')
     categories = _categories(path, file, entry)
     camera_names = _camera_names(file, entry)
     unit = fields.number(entry.get('depth_unit', 0.001), f'{file}: depth_unit')
@@ -107,6 +111,8 @@ def _load_hooc(path: Path, with_scenes: bool) -> SceneSet:
     world = fields.name(entry.get('world_frame', 'table'), f'{file}: world_frame')
     own = bool(set_cameras) and world != UNKNOWN_WORLD
     folders = _scene_folders(path, needed=with_scenes or not set_cameras)
+    if with_scenes:
+        annotations.check_sequences(path)
     scenes = tuple(_scene(folder, camera_names, set_cameras, unit, categories, world, path)
                    for folder in (folders if with_scenes else ()))
     if own:
@@ -143,7 +149,7 @@ def _categories(path: Path, file: Path, entry: dict[str, Any]) -> tuple[Category
     result = []
     for i, item in enumerate(entries):
         where = f'{file}: categories[{i}]'
-        item = fields.mapping(item, where)
+        item = fields.closed(fields.mapping(item, where), CATEGORY_KEYS, where)
         name = fields.name(fields.required(item, 'name', f'{where}:'), f'{where} name')
         where = f'{file}: category {name}:'
         mesh, *more = _meshes(path, item, where)
@@ -220,6 +226,7 @@ def _scene(folder: Path, camera_names: Sequence[str], set_cameras: Mapping[str, 
                             'record it or remove the scene')
     labels = {camera: folder / f'{camera}_labels.png' for camera in camera_names
               if (folder / f'{camera}_labels.png').is_file()}
+    annotations.check_scene(folder, camera_names, [category.name for category in categories])
     truth_file = folder / 'ground_truth.yaml'
     truth = _truth(truth_file, categories) if truth_file.is_file() else None
     cameras = _scene_cameras(folder, camera_names, set_cameras, path)
@@ -230,7 +237,7 @@ def _scene(folder: Path, camera_names: Sequence[str], set_cameras: Mapping[str, 
 def _truth(file: Path, categories: Sequence[Category]) -> tuple[TrueObject, ...]:
     """Return the objects of a ground_truth.yaml."""
     known = {category.name for category in categories}
-    objects = fields.sequence(fields.required(files.read_yaml(file), 'objects', f'{file}:'),
-                              f'{file}: objects')
+    entry = fields.closed(files.read_yaml(file), ('objects',), f'{file}:')
+    objects = fields.sequence(fields.required(entry, 'objects', f'{file}:'), f'{file}: objects')
     return tuple(true_object(item, f'{file}: objects[{i}]', known)
                  for i, item in enumerate(objects))

@@ -1,0 +1,81 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Check the files of a set that only evaluation tools read: labels, strangers, sequences.
+
+Nothing here uses their content. A mistake in them would surface as a wrong score, so they are
+checked with the rest of the set.
+"""
+
+from collections.abc import Callable, Collection, Sequence
+from pathlib import Path
+
+from hooc_perception.errors import HoocError
+from hooc_perception.io.scenes import camera_files, fields, files
+
+UNKNOWN_KEYS = ('name', 'translation', 'rotation_xyzw', 'size', 'surface_visibility', 'tag')
+SEQUENCE_KEYS = ('name', 'period_s', 'scenes', 'events')
+
+
+def check_scene(folder: Path, cameras: Sequence[str], categories: Collection[str]) -> None:
+    """
+    Check labels.yaml, well_seen.yaml and unknown.yaml of a scene's folder, where they exist.
+
+    :raises HoocError: one sentence that names file, field and fix.
+    """
+    checks: dict[str, Callable[[Path], None]] = {
+        'labels.yaml': lambda file: _check_labels(file, categories),
+        'well_seen.yaml': lambda file: _check_well_seen(file, cameras),
+        'unknown.yaml': _check_unknown}
+    for name, check in checks.items():
+        if (folder / name).is_file():
+            check(folder / name)
+
+
+def check_sequences(path: Path) -> None:
+    """Check sequences.yaml of a set, where there is one; HoocError as `check_scene`."""
+    file = path / 'sequences.yaml'
+    if not file.is_file():
+        return
+    for i, item in enumerate(files.read_yaml_list(file)):
+        where = f'{file}: [{i}]'
+        item = fields.closed(fields.mapping(item, where), SEQUENCE_KEYS, where)
+        fields.name(fields.required(item, 'name', where), f'{where} name')
+        scenes = fields.sequence(fields.required(item, 'scenes', where), f'{where} scenes')
+        for scene in scenes:
+            fields.name(scene, f'{where} scenes')
+        if 'period_s' in item and fields.number(item['period_s'], f'{where} period_s') <= 0:
+            raise HoocError(f'{where} period_s is {item["period_s"]}; give the seconds between '
+                            'two frame sets')
+        for step in fields.mapping(item.get('events', {}), f'{where} events'):
+            fields.integer(step, 0, max(0, len(scenes) - 1), f'{where} events: a key')
+
+
+def _check_labels(file: Path, categories: Collection[str]) -> None:
+    """Check {label: category}; names that resemble no category may be of strangers."""
+    for label, category in files.read_yaml(file).items():
+        fields.integer(label, 1, 255, f'{file}: a label')
+        near = fields.nearest(category, categories)
+        if category not in categories and near:
+            raise HoocError(f'{file}: label {label} is {fields.short_repr(category)}, which is '
+                            f'not in dataset.yaml; is {near} meant?')
+
+
+def _check_well_seen(file: Path, cameras: Sequence[str]) -> None:
+    """Check {camera: [labels]}."""
+    for camera, labels in fields.closed(files.read_yaml(file), cameras, f'{file}:').items():
+        for label in fields.sequence(labels, f'{file}: {camera}'):
+            fields.integer(label, 1, 255, f'{file}: {camera}: a label')
+
+
+def _check_unknown(file: Path) -> None:
+    """Check the poses and sizes of strangers."""
+    entry = fields.closed(files.read_yaml(file), ('objects',), f'{file}:')
+    for i, item in enumerate(fields.sequence(fields.required(entry, 'objects', f'{file}:'),
+                                             f'{file}: objects')):
+        where = f'{file}: objects[{i}]'
+        item = fields.closed(fields.mapping(item, where), UNKNOWN_KEYS, where)
+        camera_files.pose(item, where)
+        if fields.numbers(fields.required(item, 'size', where), 3, f'{where} size').min() <= 0:
+            raise HoocError(f'{where} size is {item["size"]}; give three positive lengths in '
+                            'metres')

@@ -23,6 +23,7 @@ from hooc_perception.nodes.pace import Pace
 from hooc_perception.nodes.warm_up import overhead_camera
 from hooc_perception.ros.inputs.camera_input import CameraInput
 from hooc_perception.ros.inputs.camera_poses import PoseParameters, TfPoses
+from hooc_perception.ros.inputs.camera_topics import CameraTopics, TopicParameters
 from hooc_perception.ros.inputs.raw_frames import RawFrame
 from hooc_perception.ros.lifecycle.spin import run_node
 from hooc_perception.ros.lifecycle.stage_node import StageNode
@@ -44,7 +45,7 @@ class IngestionNode(StageNode[IngestionConfig, 'Ingestion']):
     def __init__(self, **kwargs: Any) -> None:
         """Declare parameters."""
         super().__init__(INGESTION, **kwargs)
-        self.poses = PoseParameters(self)
+        self.poses, self.topics = PoseParameters(self), TopicParameters(self)
 
     @property
     def observe_config(self) -> ObserveConfig:
@@ -85,10 +86,23 @@ class Ingestion:
         self.pace = Pace(node, self._send_if_complete)
         for name in self._names:
             node.poses.declare(name)
+            node.topics.declare(name)
         self._tf = TfPoses(node)
-        self.inputs = [CameraInput(node, name, node.poses, self._tf, self._on_frame)
-                       for name in self._names]
+        self.inputs = [CameraInput(node, name, topics, node.poses, self._tf, self._on_frame)
+                       for name, topics in self._topics().items()]
         node.steady_timer(0.5, self._on_timer)
+
+    def _topics(self) -> dict[str, CameraTopics]:
+        """Return the topics of each camera; HoocError if two cameras have the same images."""
+        node = self._node
+        topics = {name: node.topics.topics(name, node.config.camera_driver)
+                  for name in self._names}
+        cameras = {t.image: name for name, t in topics.items()}
+        for name, t in topics.items():
+            if cameras[t.image] != name:
+                raise HoocError(f'the cameras {name} and {cameras[t.image]} have the same images, '
+                                f'{t.image}; set image_topic.{name}')
+        return topics
 
     def begin(self) -> None:
         """Begin to listen; what was heard before does not count."""

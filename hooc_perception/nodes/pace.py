@@ -42,7 +42,7 @@ class Pace:
 
         :param wait_s: stop waiting after this time, with a warning; 0 never waits.
         """
-        if self.stamp_ns is None or not (wait_s and self._node.count_publishers('objects/poses')):
+        if self.stamp_ns is None or not (wait_s and self._node.publishers_of('objects/poses')):
             return False
         # Not by the node's clock: it may be set back, or stand still.
         if time.monotonic() - self._since < wait_s:

@@ -125,10 +125,8 @@ class Parsing:
         # Monotonic seconds of the result that stands; None: there is none.
         self._answered: float | None = None
         node.steady_timer(0.5, self._on_timer)
-        node.owned(node.destroy_service,
-                   node.create_service(SetBool, 'enable', self._on_enable))
-        node.owned(node.destroy_service,
-                   node.create_service(Trigger, 'reset', self._on_reset))
+        node.service(SetBool, 'enable', self._on_enable)
+        node.service(Trigger, 'reset', self._on_reset)
 
     def _try_out(self, observation: Observation, probabilities: PixelProbabilities,
                  candidates: Candidates, models: tuple[GenericModel, ...]) -> None:

@@ -31,12 +31,13 @@ class Bench:
         self.executor.add_node(self.peer)
         self.heard, self.nodes = {}, []
 
-    def add(self, kind, **parameters):
-        """Return a node with these parameters, spun with the others."""
+    def add(self, kind, remaps=(), **parameters):
+        """Return a node with these parameters and `from:=to`, spun with the others."""
         from rclpy.parameter import Parameter
-        node = kind(context=self.context, parameter_overrides=[
-            Parameter(name.replace('__', '.'), value=value)
-            for name, value in parameters.items()])
+        words = [word for remap in remaps for word in ('-r', remap)]
+        node = kind(context=self.context, cli_args=['--ros-args', *words] if words else None,
+                    parameter_overrides=[Parameter(name.replace('__', '.'), value=value)
+                                         for name, value in parameters.items()])
         self.executor.add_node(node)
         self.nodes.append(node)
         return node

@@ -33,12 +33,12 @@ def a_depth(seed=0):
 class RawCamera:
     """Publishes what a driver publishes."""
 
-    def __init__(self, bench, name, reliable=True):
+    def __init__(self, bench, name, reliable=True, image=None, info=None):
         self.peer, self.name, self.camera = bench.peer, name, a_camera(name)
         make = bench.peer.create_publisher
-        self.images = make(Image, f'{name}/depth/image_raw',
+        self.images = make(Image, image or f'{name}/depth/image_raw',
                            qos('<camera>/depth/image_raw', reliable))
-        self.infos = make(CameraInfo, f'{name}/depth/camera_info',
+        self.infos = make(CameraInfo, info or f'{name}/depth/camera_info',
                           qos('<camera>/depth/camera_info', reliable))
         self.poses = make(TransformStamped, f'{name}/extrinsics', qos('<camera>/extrinsics'))
 

@@ -53,6 +53,11 @@ class Diagnostics:
                 self._logged = {key: v for key, v in self._logged.items() if key[0] != subject}
         self._values.setdefault(subject, {}).update(values)
 
+    def over(self, subject: str, code: str) -> None:
+        """Report that a subject works if this code is the last that was reported of it."""
+        if self._state.get(subject, (OK, ''))[1] == code:
+            self.ok(subject)
+
     def state(self, subject: str, code: str, sentence: str, level: bytes = OK) -> None:
         """Report an intended state until the next report; it is neither logged nor counted."""
         self._state[subject] = (level, code, sentence, time.monotonic() - HOLD_S)
@@ -116,7 +121,10 @@ class Diagnostics:
             self.ok('clock')
 
     def _publish(self) -> None:
-        self._check_clock()
+        try:
+            self._check_clock()
+        except Exception as error:      # what is to be reported must go out whatever happens
+            self.warn('clock', 'unexpected', f'unexpected {type(error).__name__}: {error}')
         message = DiagnosticArray(status=self.statuses())
         message.header.stamp = self._node.get_clock().now().to_msg()
         self._publisher.publish(message)

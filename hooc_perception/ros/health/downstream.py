@@ -40,7 +40,7 @@ def _missing(node: Node, needed: Mapping[str, tuple[str, ...]]) -> dict[str, set
     missing: dict[str, set[str]] = {}
     for topic, names in needed.items():
         there = {info.node_name for info in
-                 node.get_subscriptions_info_by_topic(node.resolve_topic_name(topic))
+                 node.get_subscriptions_info_by_topic(topic)
                  if info.node_namespace == node.get_namespace()}
         if absent := set(names) - there:
             missing[topic] = absent

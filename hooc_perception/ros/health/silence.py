@@ -7,16 +7,19 @@ from rclpy.qos import qos_check_compatible, QoSCompatibility
 from rclpy.subscription import Subscription
 
 
-def why_silent(node: Node, subscription: Subscription) -> tuple[str, str]:
+def why_silent(node: Node, name: str, subscription: Subscription) -> tuple[str, str]:
     """
     Return (code, sentence) on why a subscription of a node receives nothing.
 
     Codes: `no_publisher`, `wrong_type`, `qos_mismatch`, `no_messages`.
+
+    :param name: of the topic as it was subscribed. rclpy remaps the names that it is asked about:
+        that of the subscription, which is remapped already, could become another one.
     """
     # rclpy annotates the message class as an instance of it.
     wanted = type_name(subscription.msg_type)   # pyright: ignore[reportArgumentType]
     topic = subscription.topic_name
-    publishers = node.get_publishers_info_by_topic(topic)
+    publishers = node.get_publishers_info_by_topic(name)
     if not publishers:
         return 'no_publisher', f'nobody publishes {topic}; {_hint(node, topic, wanted)}'
     right = [p for p in publishers if p.topic_type == wanted]
@@ -53,8 +56,8 @@ def _hint(node: Node, topic: str, wanted: str) -> str:
     alike = [name for name in others if 'depth' in name] or others
     if not alike:
         return 'start its driver, or check that ROS_DOMAIN_ID is the same on both sides'
-    return (f'there is {", ".join(alike[:4])}: remap it, or set the parameter cameras to the '
-            'names that the drivers use')
+    return (f'there is {", ".join(alike[:4])}: set the parameter image_topic.<camera> and '
+            'info_topic.<camera>, or camera_driver, or remap it')
 
 
 def _plain(reason: str) -> str:

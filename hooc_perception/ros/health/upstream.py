@@ -51,7 +51,8 @@ class Upstream:
             query.cancel()
             if query.client.service_is_ready():
                 query.pending = query.client.call_async(GetState.Request())
-                query.pending.add_done_callback(partial(self._on_state, name))
+                query.pending.add_done_callback(
+                    self._node.guarded(partial(self._on_state, name)))
 
     def forget(self) -> None:
         """Drop all pending requests: everything has arrived."""

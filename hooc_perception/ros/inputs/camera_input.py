@@ -13,6 +13,7 @@ from hooc_perception.core.config import param
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.health.silence import why_silent
 from hooc_perception.ros.inputs.camera_poses import PoseNotYet, PoseParameters, TfPoses
+from hooc_perception.ros.inputs.camera_topics import CameraTopics, DRIVERS, OURS
 from hooc_perception.ros.lifecycle.stage_config import StageConfig
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, nanoseconds, transform_message
@@ -32,6 +33,9 @@ class CameraInputConfig(StageConfig):
     image_reliability: str = param(
         'auto', 'auto subscribes reliably only if every publisher offers it.',
         choices=('auto', 'reliable', 'best_effort'))
+    camera_driver: str = param(
+        '', 'Driver of the cameras, which names their topics; driver.<camera> wins over it. Empty '
+        '= <camera>/depth/image_raw and <camera>/depth/camera_info.', choices=('', *DRIVERS))
 
 
 class CameraInput:
@@ -39,10 +43,11 @@ class CameraInput:
     Subscribe to one camera; call back with image, camera_info and pose that belong together.
 
     :ivar name: of the camera.
+    :ivar topics: that it is heard on.
     :ivar heard: monotonic seconds of the last image.
     """
 
-    def __init__(self, node: StageNode[CameraInputConfig, Any], name: str,
+    def __init__(self, node: StageNode[CameraInputConfig, Any], name: str, topics: CameraTopics,
                  poses: PoseParameters, tf: TfPoses, callback: FrameCallback) -> None:
         """
         Create the subscriptions; the executor serves them in the order of creation.
@@ -51,6 +56,7 @@ class CameraInput:
             for every image.
         """
         self.name, self.node, self._tf, self._callback = name, node, tf, callback
+        self.topics = topics
         self.heard = time.monotonic()
         self._poses = poses
         self._latched: TransformStamped | None = None       # the last <camera>/extrinsics
@@ -65,7 +71,7 @@ class CameraInput:
         node.subscription(TransformStamped, '<camera>/extrinsics', self._on_extrinsics,
                           f'{name}/extrinsics')
         self._reliable: bool | None = None
-        self._subscriptions: list[Subscription] = []
+        self._subscriptions: dict[str, Subscription] = {}   # by topic, as in `topics`
         node.owned(lambda _: self._unsubscribe(), None)
         self.adapt_reliability()
 
@@ -80,25 +86,23 @@ class CameraInput:
         """Subscribe again if what the publishers offer demands another reliability."""
         wanted = {'reliable': True, 'best_effort': False}.get(self.node.config.image_reliability)
         if wanted is None:
-            topics = [f'{self.name}/depth/image_raw', f'{self.name}/depth/camera_info']
             wanted = auto_reliability(
-                [info.qos_profile.reliability for topic in topics
-                 for info in self.node.get_publishers_info_by_topic(
-                     self.node.resolve_topic_name(topic))])
+                [info.qos_profile.reliability for topic in self.topics
+                 for info in self.node.get_publishers_info_by_topic(topic)])
         if wanted == self._reliable:
             return
         self._unsubscribe()
         self._reliable = wanted
-        for kind, suffix, callback in ((CameraInfo, 'camera_info', self._on_info),
-                                       (Image, 'image_raw', self._on_image)):
-            self._subscriptions.append(self.node.create_subscription(
-                kind, f'{self.name}/depth/{suffix}', self.node.guarded(callback),
-                qos(f'<camera>/depth/{suffix}', wanted),
-                qos_overriding_options=overridable(reliability=False)))
+        for kind, topic, row, callback in (
+                (CameraInfo, self.topics.info, OURS.info, self._on_info),
+                (Image, self.topics.image, OURS.image, self._on_image)):
+            self._subscriptions[topic] = self.node.create_subscription(
+                kind, topic, self.node.guarded(callback), qos(row, wanted),
+                qos_overriding_options=overridable(reliability=False))
 
     def _unsubscribe(self) -> None:
         while self._subscriptions:
-            self.node.destroy_subscription(self._subscriptions.pop())
+            self.node.destroy_subscription(self._subscriptions.popitem()[1])
 
     # Messages.
 
@@ -150,15 +154,16 @@ class CameraInput:
 
     def silence(self) -> tuple[str, str]:
         """Return (code, sentence) on why no images come, as far as the graph shows it."""
-        topics = {s.topic_name.rpartition('/')[2]: s for s in self._subscriptions}
-        return why_silent(self.node, topics['image_raw'])
+        return self._why_silent(self.topics.image)
+
+    def _why_silent(self, topic: str) -> tuple[str, str]:
+        return why_silent(self.node, topic, self._subscriptions[topic])
 
     def info_silence(self) -> tuple[str, str] | None:
         """Return (code, sentence) on why no camera_info comes, None if one has come."""
         if self._last_info is not None:
             return None
-        topics = {s.topic_name.rpartition('/')[2]: s for s in self._subscriptions}
-        code, sentence = why_silent(self.node, topics['camera_info'])
+        _, sentence = self._why_silent(self.topics.info)
         return 'no_camera_info', f'depth images arrive but no camera_info: {sentence}'
 
     @staticmethod

@@ -99,7 +99,7 @@ class ViewInput:
     def _explain(self) -> None:
         """Report which node is missing, or works for other cameras."""
         node = self._node
-        silent = [topic for topic in self._needed if not node.count_publishers(topic)]
+        silent = [topic for topic in self._needed if not node.publishers_of(topic)]
         if not silent:
             return
         makers = dict.fromkeys(TOPICS[self._needed[topic]].publisher for topic in silent)

@@ -14,6 +14,7 @@ from hooc_perception.ros.qos import overridable, qos
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecyclePublisher
+from rclpy.service import Service
 from rclpy.subscription import Subscription
 from rclpy.timer import Timer
 
@@ -55,6 +56,33 @@ class EndpointNode(TolerantLifecycleNode):
             kind, name or topic, self.guarded(callback), qos(topic),
             qos_overriding_options=overridable()))
 
+    def publishers_of(self, topic: str) -> int:
+        """
+        Return the number of publishers of a topic under the name that it is remapped to.
+
+        :param topic: as it was subscribed; rclpy's count_publishers does not remap it.
+        """
+        return self.count_publishers(self.resolve_topic_name(topic))
+
+    def create_timer(self, timer_period_sec: float, callback: Callable[[], object],
+                     *args: Any, **kwargs: Any) -> Timer:
+        """Return a timer as rclpy makes it, whose callback cannot end the node."""
+        return super().create_timer(timer_period_sec, self.guarded(
+            callback, 'timer', 'it is tried again at the next tick'), *args, **kwargs)
+
+    def service(self, kind: type, name: str, callback: Callable[[Any, Any], Any]) -> Service:
+        """
+        Offer a service whose responses have `success` and `message`, until clean-up.
+
+        An unexpected exception in the callback fails the call, not the node.
+        """
+        def answer(request: Any, response: Any) -> Any:
+            if not self.guarded(callback, f'service {name}', 'the call fails')(request, response):
+                response.success = False
+                response.message = 'an unexpected error, which the log of the node shows'
+            return response
+        return self.owned(self.destroy_service, self.create_service(kind, name, answer))
+
     def steady_timer(self, seconds: float, callback: Callable[[], object]) -> Timer:
         """Return a timer by the steady clock: simulated time may stop or jump back."""
         return self.owned(self.destroy_timer, self.create_timer(
@@ -86,6 +114,7 @@ class EndpointNode(TolerantLifecycleNode):
         def survive(*args: Any) -> bool:
             try:
                 callback(*args)
+                self.diagnostics.over(thing, 'unexpected')
                 return True
             except Exception as error:
                 raise_interrupt(error)

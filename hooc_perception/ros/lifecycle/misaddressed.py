@@ -11,6 +11,8 @@ from hooc_perception.chain import node_class, NODES, PROFILES, STAGES
 from hooc_perception.core.config import Config
 from hooc_perception.core.profiles import profile, profiles_with
 
+# Parameters `<kind>.<camera>` of the ingestion node.
+_PER_CAMERA = ('extrinsics', 'image_topic', 'info_topic', 'driver')
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 
@@ -63,8 +65,8 @@ def known_elsewhere() -> set[str]:
 def _sentence(name: str, known: Collection[str], declared: Iterable[str]) -> str:
     """Return what is wrong with a name, and what it could have been."""
     kind, _, rest = name.partition('.')
-    if kind == 'extrinsics':
-        cameras = sorted(n.partition('.')[2] for n in declared if n.startswith('extrinsics.'))
+    if kind in _PER_CAMERA:
+        cameras = sorted(n.partition('.')[2] for n in declared if n.startswith(f'{kind}.'))
         return (f'parameter {name} is for a camera that is not used; the cameras are '
                 f'{", ".join(cameras) or "unknown here: set it for the ingestion_node"}')
     if kind == 'qos_overrides':

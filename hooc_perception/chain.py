@@ -69,6 +69,7 @@ TOPICS = {
     'objects/<category>/poses': Topic(1, True, PARSING),
     'objects/markers': Topic(1, True, PARSING),
     'objects/detections': Topic(1, True, PARSING),
+    'scene/table': Topic(1, True, INGESTION),
     'scene/unexplained': Topic(1, True, PARSING),
     'scene/summary': Topic(1, True, PARSING),
     '/tf': Topic(100),

@@ -16,13 +16,14 @@ from typing import Any, TYPE_CHECKING, TypeVar
 from hooc_perception.core.arrays import AnyArray
 from hooc_perception.core.classification.classify import classify, KIND_PAPER
 from hooc_perception.core.frame.frame import Frame
-from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.geometry import inverse, stage_rng
 from hooc_perception.core.parsing.uncertainty import pose_uncertainty
 from hooc_perception.core.parsing.verifier import Verifier
 from hooc_perception.core.profiles import Profile, with_overrides
 from hooc_perception.core.profiles import profile as profile_of
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
+from hooc_perception.core.segment.table import table_pose
 from hooc_perception.core.symmetry import canonical_objects
 from hooc_perception.core.types import (
     Candidates,
@@ -110,15 +111,18 @@ class Parser:
         frame = self.frame(observation, probabilities)
         pool = lap('propose', self.propose(frame, seed))
         if change_pool is not None:
-            pool = change_pool(pool)
+            T = observation.T_target_table
+            pool = change_pool(pool.moved(T)).moved(None if T is None else inverse(T))
         parsed = self.decide(frame, pool, seed)
-        return scene_of(parsed.timed(**lap.seconds), observation, self.models)
+        return scene_of(parsed.moved(observation.T_target_table).timed(**lap.seconds),
+                        observation.in_target_frame(), self.models)
 
     def observe(self, views: Sequence[DepthView | RectifiedView]) -> Observation:
         """Stage 1: rectify the views, level them on the support plane, find the foreground."""
         config = self.profile.observe
-        return observe([rectify(view, config) if isinstance(view, DepthView) else view
-                        for view in views], config)
+        rectified = [rectify(view, config) if isinstance(view, DepthView) else view
+                     for view in views]
+        return observe(rectified, config, table_pose(rectified, config))
 
     def classify(self, observation: Observation) -> PixelProbabilities:
         """Stage 2: class probabilities of the foreground pixels."""

@@ -88,7 +88,7 @@ def _camera_case(rng: np.random.Generator, _: Path) -> None:
 def _decode(image: Image, info: CameraInfo, transform: TransformStamped) -> None:
     """Do with the messages of a camera what the ingestion node does."""
     frames = RawFrames('left')
-    frame = frames.decode(image, info, transform, 4.0)
+    frame = frames.decode(image, info, transform, ObserveConfig())
     frames.remember(frame.depth, 3)
     if frame.depth.size > 2 ** 22:
         raise HoocError('the image is larger than the fuzzer has time for')

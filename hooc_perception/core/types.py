@@ -22,6 +22,7 @@ from hooc_perception.core.arrays import (
     UInt16Array,
 )
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 
 @dataclass(frozen=True)
@@ -87,10 +88,22 @@ class Observation:
 
     :ivar views: one ObservedView a camera, in camera order.
     :ivar noise_m: standard deviation of the measured heights of the table top.
+    :ivar T_target_table: (4, 4) float64 from the table frame, in which the views are posed and
+        the stages work, to the target frame of results; None = the same frame.
     """
 
     views: tuple[ObservedView, ...]
     noise_m: float
+    T_target_table: Float64Array | None = None
+
+    def in_target_frame(self) -> 'Observation':
+        """Return the same with its views posed in the target frame."""
+        if self.T_target_table is None:
+            return self
+        return Observation(tuple(
+            replace(view, camera=replace(view.camera, T_world_camera=self.T_target_table
+                                         @ view.camera.T_world_camera))
+            for view in self.views), self.noise_m)
 
 
 @dataclass(frozen=True)
@@ -144,6 +157,15 @@ class Candidates:
         """Return a set without members."""
         return Candidates(np.zeros(0, np.uint16), np.zeros((0, 3)), np.zeros((0, 4)),
                           np.zeros((0, 3), np.float32), np.zeros(0, np.float32))
+
+    def moved(self, T_to_from: Float64Array | None) -> 'Candidates':
+        """Return the same in another frame, by a rigid (4, 4); None = the same frame."""
+        if T_to_from is None or not len(self):
+            return self
+        turn = Rotation.from_matrix(T_to_from[:3, :3])
+        return replace(self, translation=self.translation @ T_to_from[:3, :3].T
+                       + T_to_from[:3, 3],
+                       rotation_xyzw=(turn * Rotation.from_quat(self.rotation_xyzw)).as_quat())
 
     def take(self, index: 'AnyArray | list[int]') -> 'Candidates':
         """Return the rows that `index` (integers or bool mask) names."""
@@ -251,6 +273,11 @@ class ParsedScene:
     seconds: dict[str, float] = field(default_factory=dict)
     sigma_t: Float32Array | None = None
     sigma_r: Float32Array | None = None
+
+    def moved(self, T_to_from: Float64Array | None) -> 'ParsedScene':
+        """Return the same in another frame, by a rigid (4, 4); None = the same frame."""
+        return replace(self, objects=self.objects.moved(T_to_from),
+                       pool=self.pool.moved(T_to_from))
 
     def timed(self, **seconds: float) -> 'ParsedScene':
         """Return a copy whose `seconds` also hold the given stages."""

@@ -47,17 +47,17 @@ class Assembly:
         self.frames = {name: RawFrames(name) for name in self._names}
 
     def add(self, name: str, image: Image, info: CameraInfo, transform: TransformStamped,
-            max_depth_m: float) -> str | None:
+            observe_config: ObserveConfig) -> str | None:
         """
         Take in one raw image with its calibration and pose.
 
-        :param max_depth_m: beyond it no reading counts.
+        :param observe_config: how the image will be observed.
         :return: the reason if this image or another one was dropped, see FrameSets.add.
         """
         config, frames = self._node.config, self.frames[name]
         self.sets.config = config
         try:
-            frame = frames.decode(image, info, transform, max_depth_m)
+            frame = frames.decode(image, info, transform, observe_config)
         except FrameRefused as error:
             self._node.diagnostics.error(name, error.code, f'{error}; the image is dropped')
             return error.code

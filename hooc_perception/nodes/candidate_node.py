@@ -63,7 +63,8 @@ class Proposal:
         candidates = self._parser.propose(self._parser.frame(observation, probabilities),
                                           self._node.config.seed)
         poses, attributes = candidates_messages(
-            candidates, header(stamp_ns, self._node.config.target_frame))
+            candidates.moved(observation.T_target_table),
+            header(stamp_ns, self._node.config.target_frame))
         self._attributes.publish(attributes)
         self._poses.publish(poses)
         self._node.diagnostics.ok('propose', seconds=time.monotonic() - start,

@@ -65,7 +65,7 @@ class Classification:
         self._parser = self._parser.changed(node_profile(self._node, self._model))
         probabilities = self._parser.classify(observation)
         self._probabilities.publish(probabilities_message(
-            probabilities, observation, self._classes,
+            probabilities, observation.in_target_frame(), self._classes,
             header(stamp_ns, self._node.config.target_frame)))
         seconds = time.monotonic() - start
         images = label_images(probabilities, observation)

@@ -13,6 +13,13 @@ from hooc_perception.core.segment.checks import table_trouble
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
+from hooc_perception.core.segment.table import (
+    in_table_frame,
+    measured,
+    radius_m,
+    Table,
+    TableTracker,
+)
 from hooc_perception.core.types import DepthView, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.frame_sets import FrameSet
@@ -28,13 +35,11 @@ from hooc_perception.ros.inputs.raw_frames import RawFrame
 from hooc_perception.ros.lifecycle.spin import run_node
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header
+from hooc_perception.ros.outputs.table_output import TableOutput
 from hooc_perception.ros.outputs.view_output import ViewOutput
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
-
-# The table does not come and go: its absence is looked for at most this often.
-LOOK_FOR_TABLE_S = 5.0
 
 
 class IngestionNode(StageNode[IngestionConfig, 'Ingestion']):
@@ -80,8 +85,8 @@ class Ingestion:
             flat = DepthView(overhead_camera(), np.ones((120, 160), np.float32))
             observe([rectify(flat, node.observe_config)], node.observe_config)
         self.number = 0            # of sets that were sent
-        self._table_checked = -LOOK_FOR_TABLE_S
         self.output = ViewOutput(node, self._names)
+        self._table, self._table_output = TableTracker(), TableOutput(node)
         self._refused = node.publisher(Header, 'views/refused')
         self.pace = Pace(node, self._send_if_complete)
         for name in self._names:
@@ -115,7 +120,7 @@ class Ingestion:
                   transform: TransformStamped) -> None:
         """Take in one calibrated raw image; send a set if one is complete."""
         reason = self.assembly.add(name, image, info, transform,
-                                   self._node.observe_config.max_depth_m)
+                                   self._node.observe_config)
         if reason == 'time_jump':
             self.pace.forget()
             self._tf.clear()
@@ -154,7 +159,8 @@ class Ingestion:
         try:
             views, counts = self.assembly.views(frame_set, node.observe_config)
             code = 'refused'
-            observation = observe(views, node.observe_config)
+            table = self._table.update(views, node.observe_config)
+            observation = observe(views, node.observe_config, table.T_target_table)
         except HoocError as error:
             node.diagnostics.error('views', code, f'{error}; the set is dropped')
             self._refused.publish(head)
@@ -171,18 +177,18 @@ class Ingestion:
             'views', stamp_ns=frame_set.stamp_ns, sets=self.number,
             cameras=sum(frame is not None for frame in frame_set.frames),
             seconds=time.monotonic() - start)
-        self._look_for_table(views, frame_set)
+        self._report_table(table, views, frame_set, head)
 
-    def _look_for_table(self, views: Sequence[RectifiedView],
-                        frame_set: FrameSet[RawFrame]) -> None:
-        """Report now and then which cameras do not see the table where it should be."""
-        if time.monotonic() - self._table_checked < LOOK_FOR_TABLE_S:
+    def _report_table(self, table: Table, views: Sequence[RectifiedView],
+                      frame_set: FrameSet[RawFrame], head: Header) -> None:
+        """Publish where the table is, if it moved and now and then; name who does not see it."""
+        config, output = self._node.observe_config, self._table_output
+        if not output.due and not output.moved(table):
             return
-        self._table_checked = time.monotonic()
-        config = self._node.observe_config
-        troubles = {view.camera.name: table_trouble(view, config.table_band_m,
-                                                    config.workspace_radius_m)
-                    for view, frame in zip(views, frame_set.frames) if frame is not None}
+        output.publish(measured(table, views, config) if output.due else table, head)
+        troubles = {view.camera.name: table_trouble(view, config.table_band_m, radius_m(config))
+                    for view, frame in zip(in_table_frame(views, table.T_target_table),
+                                           frame_set.frames) if frame is not None}
         for name, trouble in troubles.items():
             if trouble:
                 self._node.diagnostics.warn(name, 'no_table', trouble)

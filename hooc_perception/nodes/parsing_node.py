@@ -13,6 +13,7 @@ from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import PARSING
 from hooc_perception.core.config import param
 from hooc_perception.core.frame.frame import Frame
+from hooc_perception.core.geometry import inverse
 from hooc_perception.core.parsing.tracking import TrackConfig, Tracker
 from hooc_perception.core.parsing.unexplained import unexplained_points
 from hooc_perception.core.types import (
@@ -137,15 +138,18 @@ class Parsing:
         unexplained_points(observation, parsed.objects, models)
 
     def _parsed(self, observation: Observation, messages: dict[str, Any]) -> ParsedScene:
-        """Return the ParsedScene of what came together for one stamp."""
+        """Return the ParsedScene, in the target frame, of what came together for one stamp."""
         n = len(self.models)
         probabilities = probabilities_from_message(messages['probabilities'], observation, n)
         pool = candidates_from_messages(messages['poses'], messages['attributes'],
                                         [len(model.members) for model in self.models])
         self._parser = self._parser.changed(node_profile(self._node, self._model),
                                             self._node.config.sigmas)
-        return self._parser.decide(self._parser.frame(observation, probabilities), pool,
-                                   self._node.config.seed)
+        T = observation.T_target_table
+        parsed = self._parser.decide(self._parser.frame(observation, probabilities),
+                                     pool if T is None else pool.moved(inverse(T)),
+                                     self._node.config.seed)
+        return parsed.moved(T)
 
     def on_set(self, stamp_ns: int, observation: Observation, messages: dict[str, Any]) -> None:
         """Parse one frame set and publish the result."""
@@ -154,7 +158,7 @@ class Parsing:
         self._tracker.config = node.config
         ids, objects = self._tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
-        left = unexplained_points(observation, objects, self.models)
+        left = unexplained_points(observation.in_target_frame(), objects, self.models)
         scene = detected_scene(parsed, ids, self.models, stamp_ns, frame)
         age_s = (node.now_ns() - stamp_ns) * 1e-9
         self.output.publish(parsed, ids, stamp_ns, frame, age_s, left)

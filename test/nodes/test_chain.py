@@ -11,6 +11,7 @@ from dataclasses import replace
 import json
 
 from hooc_perception.core.frame.frame import Frame
+from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import DepthView
@@ -19,7 +20,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from geometry_msgs.msg import PoseArray  # noqa: E402
+from geometry_msgs.msg import PolygonStamped, PoseArray  # noqa: E402
 from hooc_perception.nodes import parsing_node
 from hooc_perception.nodes.warm_up import overhead_camera
 from hooc_perception.parser import Parser
@@ -79,6 +80,40 @@ def test_stages_get_what_the_one_process_chain_gives_them(chain, folder):
     same_bits(stages.given['parse'][2], pool)
     assert stages.given['propose'][3] == SEED
     assert stages.given['parse'][3:] == (SEED, 1)
+
+
+def test_a_table_that_is_found_in_the_frame_of_a_robot(bench, make_chain):
+    T = matrix_from_pose([0.6, -0.1, 0.72], [0, 0, np.sin(0.4), np.cos(0.4)])
+    translation, rotation = pose_from_matrix(T @ overhead_camera().T_world_camera)
+    own = {'target_frame': 'base_link', 'extrinsics.overhead': [*translation, *rotation]}
+    stages, send = make_chain(parameters={
+        0: {**own, 'observe.table': 'find', 'observe.workspace': '[[0.0, -0.7], [1.2, 0.5]]'},
+        **{k: {'target_frame': 'base_link'} for k in (1, 2, 3)}})
+    heard = heard_answer(bench, stages)
+    tables = bench.hear(PolygonStamped, 'scene/table', qos('scene/table'))
+    pixels = bench.hear(PointCloud2, 'pixels/probabilities', qos('pixels/probabilities'))
+    send()
+    assert bench.spin(lambda: all(heard.values()) and tables and pixels), (
+        [bench.reasons(node) for node in bench.chain])
+    observation, _, pool = stages.given['parse'][:3]
+    found = observation.T_target_table
+    np.testing.assert_allclose(found[:3, 3], T[:3, 3], atol=0.004)
+    assert np.degrees(np.arccos(found[2, 2])) < 0.5
+    # The stages work on the table, the answer is in the frame of the robot.
+    np.testing.assert_allclose(pool.translation, stages.candidates.translation, atol=1e-6)
+    answer = candidates_from_messages(heard['objects/poses'][-1],
+                                      heard['objects/attributes'][-1])
+    np.testing.assert_allclose(answer.translation, pool.moved(found).take([0, 2]).translation,
+                               atol=1e-9)
+    assert heard['objects/poses'][-1].header.frame_id == 'base_link'
+    for rows in (cloud_rows(pixels[-1]), cloud_rows(heard['scene/unexplained'][-1])):
+        assert len(rows) and 0.72 < np.median(rows['z']) < 0.95
+    corners = [(p.x, p.y, p.z) for p in tables[-1].polygon.points]
+    assert len(corners) >= 3 and tables[-1].header.frame_id == 'base_link'
+    np.testing.assert_allclose(np.array(corners)[:, 2], 0.72, atol=0.006)
+    status = next(s for s in bench.chain[0].diagnostics.statuses() if s.name.endswith(': table'))
+    values = {v.key: v.value for v in status.values}
+    assert float(values['height_m']) == pytest.approx(0.72, abs=0.004)
 
 
 def test_parsing_proposes_again_as_the_one_process_chain_does(bench, make_chain, folder):

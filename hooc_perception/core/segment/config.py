@@ -5,6 +5,10 @@
 from dataclasses import dataclass
 
 from hooc_perception.core.config import Config, param
+from hooc_perception.core.segment.regions import workspace_of
+from hooc_perception.errors import HoocError
+
+MOST_RADIUS_M = 3.0
 
 
 @dataclass(frozen=True)
@@ -17,7 +21,8 @@ class ObserveConfig(Config):
         'a calibration error of a few millimetres and a degree.', 'm', 0.005, 0.1)
     workspace_radius_m: float = param(
         0.8, 'Only points within this horizontal distance of the world origin can be foreground '
-        'or contribute to the plane fit.', 'm', 0.1, 3.0)
+        'or contribute to the plane fit; without effect where a workspace is given.', 'm',
+        0.1, MOST_RADIUS_M)
     max_height_m: float = param(
         0.6, 'Points higher above the table than this are never foreground.', 'm', 0.05, 2)
     max_correction_m: float = param(
@@ -32,3 +37,33 @@ class ObserveConfig(Config):
         0.12, 'Smallest lateral length over which the depth distortion of a flat table is '
         'compensated, so that objects lower than the distortion are still segmented; 0 = the '
         'table is assumed to be flat.', 'm', 0.0, 1.0)
+    workspace: str = param(
+        '', 'Where objects are looked for, in the target frame: corners of a polygon, '
+        '"[[x, y], [x, y], [x, y]]", or two opposite corners of a box, "[[x, y, z], [x, y, z]]"; '
+        'empty = the circle of workspace_radius_m.', 'm', runtime=True)
+    ignore: str = param(
+        '', 'A list of regions, each like workspace, in which nothing is an object: '
+        '"[[[x, y], [x, y]], ...]".', 'm', runtime=True)
+    table: str = param(
+        'fixed', 'fixed: z = 0 of the target frame is the table top. find: the table is found and '
+        'tracked, and the target frame may be any, such as base_link.',
+        choices=('fixed', 'find'), runtime=True)
+    table_low_m: float = param(
+        -0.5, 'A table that has to be found is not below this z of the target frame.', 'm',
+        -10.0, 10.0, runtime=True)
+    table_high_m: float = param(
+        1.5, 'A table that has to be found is not above this z of the target frame.', 'm',
+        -10.0, 10.0, runtime=True)
+    table_tilt_deg: float = param(
+        10.0, 'Largest angle between the normal of a table that has to be found and the z axis '
+        'of the target frame; 180 = z is not up (an optical frame), so the upper edges of the '
+        'images tell which way is up, and neither bound of z applies.', 'deg', 0.0, 180.0,
+        runtime=True)
+
+    def __post_init__(self) -> None:
+        """Raise HoocError where a parameter is out of its range, or a region is none."""
+        super().__post_init__()
+        workspace_of(self.workspace, self.ignore)
+        if self.table_low_m >= self.table_high_m:
+            raise HoocError(f'parameter table_low_m is {self.table_low_m:g}, not below '
+                            f'table_high_m, {self.table_high_m:g}; give a range of heights')

@@ -7,9 +7,12 @@ The empty scene is computed from the camera's pose, not recorded: the table plan
 meets the table, and the measurement itself elsewhere.
 """
 
+from dataclasses import dataclass
+
 from hooc_perception.core.arrays import BoolArray, Float32Array, Float64Array
-from hooc_perception.core.geometry import rays
+from hooc_perception.core.geometry import rays, transform
 from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.regions import Workspace
 from hooc_perception.core.segment.uneven import uneven_table
 from hooc_perception.core.types import Camera, ObservedView
 import numpy as np
@@ -23,14 +26,44 @@ BEHIND_M = 0.05
 FEWEST_PIXELS = 6
 
 
-def against_table(camera: Camera, depth: Float32Array, sigma_m: float,
-                  config: ObserveConfig) -> ObservedView:
+@dataclass(frozen=True, eq=False)
+class Allowed:
+    """
+    Where foreground may be.
+
+    :ivar workspace: in the target frame.
+    :ivar T_target_table: (4, 4); None = the identity.
+    :ivar radius_m: largest horizontal distance from the origin of the table frame.
+    """
+
+    workspace: Workspace
+    T_target_table: Float64Array | None
+    radius_m: float
+
+    def __call__(self, points: Float64Array, pixels: BoolArray) -> BoolArray:
+        """
+        Return those of the `pixels` (H, W) whose points lie in the workspace.
+
+        :param points: (H, W, 3) table frame.
+        """
+        if self.workspace.region is None and not self.workspace.ignored:
+            return pixels
+        chosen = points[pixels]
+        T = self.T_target_table
+        inside = pixels.copy()
+        inside[pixels] = self.workspace.contains(chosen if T is None else transform(T, chosen))
+        return inside
+
+
+def against_table(camera: Camera, depth: Float32Array, sigma_m: float, config: ObserveConfig,
+                  allowed: Allowed) -> ObservedView:
     """
     Segment the foreground of one levelled view and add the depth of the empty scene.
 
     :param camera: its pose puts the table at z = 0, see `level`.
     :param depth: (H, W) float32 metres, rectified, NaN = none.
     :param sigma_m: standard deviation of the heights of the table, metres.
+    :param allowed: where foreground may be.
     """
     directions = _world_rays(camera, depth.shape)
     plane = _plane_depth(camera, directions)
@@ -39,10 +72,10 @@ def against_table(camera: Camera, depth: Float32Array, sigma_m: float,
         points = directions * depth[..., None] + T[:3, 3]
         hit = directions[..., :2] * plane[..., None] + T[:2, 3]
     seen = np.isfinite(depth)
-    inside = np.hypot(hit[..., 0], hit[..., 1]) < TABLE_REACH * config.workspace_radius_m
+    inside = np.hypot(hit[..., 0], hit[..., 1]) < TABLE_REACH * allowed.radius_m
     behind = seen & (depth > plane + BEHIND_M)
     table = np.isfinite(plane) & inside & ~_opened(behind)
-    near = np.hypot(points[..., 0], points[..., 1]) < config.workspace_radius_m
+    near = np.hypot(points[..., 0], points[..., 1]) < allowed.radius_m
     height = points[..., 2]
     above = height > _threshold(sigma_m, config)
     if config.uneven_m > 0:
@@ -51,6 +84,7 @@ def against_table(camera: Camera, depth: Float32Array, sigma_m: float,
         base, local_sigma = uneven_table(height, flat & ~above, pixels)
         above |= height - base > _threshold(local_sigma, config)
     foreground = seen & near & above & (height < config.max_height_m)
+    foreground = allowed(points, foreground)
     foreground &= ~_tiny(foreground)
     return _with_background(camera, depth, foreground, table, plane)
 

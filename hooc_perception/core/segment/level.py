@@ -19,33 +19,34 @@ NARROWEST_M, LEAST_SIGMA_M, MOST_SIGMA_M = 0.002, 0.0005, 0.02
 MAX_SLOPE = 0.05
 
 
-def level(view: RectifiedView, config: ObserveConfig) -> tuple[Camera, float]:
+def level(view: RectifiedView, config: ObserveConfig, radius_m: float) -> tuple[Camera, float]:
     """
     Fit the support plane that one camera sees and move the camera so that it lies at z = 0.
 
     Only height, roll and pitch can be observed from a plane; heading and position on the table
     stay as calibrated. A correction that is too large is rejected.
 
+    :param radius_m: horizontal distance from the origin within which to look.
     :return: (camera, with the corrected pose; standard deviation of the heights of the table in
         metres, NaN if the view shows too little of it).
     """
     points = back_project(view.depth, view.camera).reshape(-1, 3)
     near = ((np.abs(points[:, 2]) < config.table_band_m)
-            & (np.hypot(points[:, 0], points[:, 1]) < config.workspace_radius_m))
+            & (np.hypot(points[:, 0], points[:, 1]) < radius_m))
     if near.sum() < FEWEST_POINTS:
         return view.camera, np.nan
-    fit = _fitted_plane(points[near][::max(1, int(near.sum()) // MOST_POINTS)],
+    fit = fitted_plane(points[near][::max(1, int(near.sum()) // MOST_POINTS)],
                         config.table_band_m)
     if fit is None:
         return view.camera, np.nan
     plane, sigma = fit
     if abs(plane[2]) > config.max_correction_m or np.hypot(*plane[:2]) > MAX_SLOPE:
         return view.camera, sigma
-    T = _levelling(plane)
+    T = levelling(plane)
     return replace(view.camera, T_world_camera=T @ view.camera.T_world_camera), sigma
 
 
-def _fitted_plane(points: Float64Array,
+def fitted_plane(points: Float64Array,
                   band_m: float) -> tuple[Float64Array, float] | None:
     """
     Fit z = a x + b y + c to points (n, 3) by least squares over a narrowing set of inliers.
@@ -70,7 +71,7 @@ def _fitted_plane(points: Float64Array,
     return plane, sigma
 
 
-def _levelling(plane: Float64Array) -> Float64Array:
+def levelling(plane: Float64Array) -> Float64Array:
     """Return the (4, 4) transform that turns and lifts the plane z = a x + b y + c to z = 0."""
     normal = np.array([-plane[0], -plane[1], 1.0])
     normal /= np.linalg.norm(normal)

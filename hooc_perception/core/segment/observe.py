@@ -10,9 +10,12 @@ and the depth of the empty scene (foreground.py). Rectification itself comes bef
 
 from collections.abc import Sequence
 
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.segment.config import ObserveConfig
-from hooc_perception.core.segment.foreground import against_table
+from hooc_perception.core.segment.foreground import against_table, Allowed
 from hooc_perception.core.segment.level import LEAST_SIGMA_M, level, MOST_SIGMA_M
+from hooc_perception.core.segment.regions import workspace_of
+from hooc_perception.core.segment.table import in_table_frame, radius_m
 from hooc_perception.core.types import Observation, RectifiedView
 from hooc_perception.errors import HoocError
 import numpy as np
@@ -21,14 +24,16 @@ import numpy as np
 DEFAULT_NOISE_M = 0.003
 
 
-def observe(views: Sequence[RectifiedView],
-            config: ObserveConfig = ObserveConfig()) -> Observation:
+def observe(views: Sequence[RectifiedView], config: ObserveConfig = ObserveConfig(),
+            T_target_table: Float64Array | None = None) -> Observation:
     """
     Level every camera on the table and separate foreground from background.
 
-    :param views: in camera order; world z = 0 is the table top. A view without any reading
-        stands for a camera that has dropped out: it shows nothing and rules nothing out.
-    :return: Observation; pure and deterministic in its input.
+    :param views: in camera order, posed in the target frame. A view without any reading stands
+        for a camera that has dropped out: it shows nothing and rules nothing out.
+    :param T_target_table: (4, 4), see `table.locate_table`; None where z = 0 of the target frame
+        is the table top.
+    :return: Observation, in the table frame; pure and deterministic in its input.
     :raises HoocError: if no view holds any reading.
     """
     if not views:
@@ -37,10 +42,13 @@ def observe(views: Sequence[RectifiedView],
         raise HoocError(f'the depth image of camera {views[0].camera.name} holds no reading '
                         'at all (every pixel is 0 or NaN), nor does any other; check the '
                         'sensors and the unit')
-    fits = [level(view, config) for view in views]
+    views, reach_m = in_table_frame(views, T_target_table), radius_m(config)
+    allowed = Allowed(workspace_of(config.workspace, config.ignore), T_target_table, reach_m)
+    fits = [level(view, config, reach_m) for view in views]
     known = [sigma for _, sigma in fits if np.isfinite(sigma)]
     noise_m = (float(np.clip(np.median(known), LEAST_SIGMA_M, MOST_SIGMA_M)) if known
                else DEFAULT_NOISE_M)
     return Observation(
-        tuple(against_table(camera, view.depth, sigma if np.isfinite(sigma) else noise_m, config)
-              for view, (camera, sigma) in zip(views, fits)), noise_m)
+        tuple(against_table(camera, view.depth, sigma if np.isfinite(sigma) else noise_m, config,
+                            allowed)
+              for view, (camera, sigma) in zip(views, fits)), noise_m, T_target_table)

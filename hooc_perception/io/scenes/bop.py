@@ -5,7 +5,7 @@ Read BOP datasets (Benchmark for 6D Object Pose Estimation) as scene sets.
 
 BOP's millimetres become metres, and its poses become those of the models' bounding-box centres.
 Images of one scene folder with poses in a common world become the views of one scene; an image
-without extrinsics is a scene of its own. The table frame is estimated (support_plane.py).
+without extrinsics is a scene of its own. The table frame is estimated (table_frame.py).
 """
 
 from collections.abc import Mapping, Sequence

@@ -2,12 +2,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Express a recording in the frame of its table, whether that frame is known or estimated."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
+from hooc_perception.core.geometry import pose_from_matrix
+from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.rectify import rectify
+from hooc_perception.core.segment.support_plane import find_support_plane, SupportPlane
 from hooc_perception.core.types import Camera, DepthView
-from hooc_perception.io.scenes.support_plane import estimate_table_frame, SupportPlane
+from hooc_perception.errors import HoocError
+
+# Whatever was measured may show the table.
+_RECTIFY = ObserveConfig(max_depth_m=20.0)
 
 
 class TableFrameScene:
@@ -47,4 +55,28 @@ class TableFrameScene:
     @property
     def world(self) -> dict[str, Any]:
         """Return the results entries that describe an estimated world frame, {} if it is known."""
-        return {} if self.table is None else {'world': self.table.as_dict()}
+        return {} if self.table is None else {'world': _as_dict(self.table)}
+
+
+def estimate_table_frame(views: Sequence[DepthView], scene_name: str) -> SupportPlane:
+    """
+    Return the SupportPlane of one scene, see find_support_plane.
+
+    :param views: raw; the poses of their cameras define the source frame.
+    :raises HoocError: if there is none.
+    """
+    plane = find_support_plane([rectify(view, _RECTIFY) for view in views])
+    if plane is None:
+        raise HoocError(f'scene {scene_name}: no support plane was found in the depth images, so '
+                        'the table frame is unknown; give extrinsics in a table frame')
+    return plane
+
+
+def _as_dict(plane: SupportPlane) -> dict[str, Any]:
+    """Return plain data for a results file."""
+    translation, rotation = pose_from_matrix(plane.T_table_source)
+    return {'frame': 'table', 'estimated_from': 'dominant support plane',
+            'table_from_source': {'translation': translation.tolist(),
+                                  'rotation_xyzw': rotation.tolist()},
+            'inlier_share': round(plane.inlier_share, 4),
+            'residual_m': round(plane.residual_m, 5)}

@@ -14,6 +14,7 @@ from hooc_perception.core.segment.checks import (
     reading_trouble,
     same_calibration,
 )
+from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.fusion import Fusion
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
@@ -64,21 +65,25 @@ class RawFrames:
         self._fusion = Fusion()
 
     def decode(self, image: Image, info: CameraInfo, transform: TransformStamped,
-               max_depth_m: float) -> RawFrame:
+               config: ObserveConfig) -> RawFrame:
         """
         Return the RawFrame of three messages.
 
+        :param config: how it will be observed: beyond `max_depth_m` no reading counts, and
+            cameras are above a table that lies at z = 0 (`table`).
         :raises FrameRefused: with the code `bad_calibration`, `bad_extrinsics`,
             `absurd_extrinsics`, `bad_image`, `size_mismatch`, `wrong_unit` or `no_readings`.
         """
         camera = self._camera(info, transform)
+        if config.table == 'fixed':
+            _refuse('absurd_extrinsics', pose_trouble(camera), f'camera {self.name}: ')
         depth = _refusing('bad_image', depth_from_message, image)
         if depth.shape != (camera.height, camera.width):
             raise FrameRefused(
                 'size_mismatch', f'the depth image of camera {self.name} is {image.width} x '
                 f'{image.height} pixels, but its camera_info is for {camera.width} x '
                 f'{camera.height}; publish both at the same resolution')
-        _refuse('wrong_unit', depth_unit_error(depth, image.encoding, max_depth_m))
+        _refuse('wrong_unit', depth_unit_error(depth, image.encoding, config.max_depth_m))
         _refuse('no_readings', reading_trouble(depth))
         if self.camera is not None and not same_calibration(camera, self.camera):
             self._fusion.forget()
@@ -120,7 +125,6 @@ class RawFrames:
         unmoved = TransformStamped()
         _refusing('bad_calibration', camera_from_messages, self.name, info, unmoved)
         camera = _refusing('bad_extrinsics', camera_from_messages, self.name, info, transform)
-        _refuse('absurd_extrinsics', pose_trouble(camera), f'camera {self.name}: ')
         self._known = key, camera
         return camera
 

@@ -6,7 +6,7 @@ from hooc_perception.core.geometry import inverse
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
-from hooc_perception.io.scenes.support_plane import estimate_table_frame
+from hooc_perception.io.scenes.table_frame import estimate_table_frame
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

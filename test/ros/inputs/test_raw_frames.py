@@ -7,6 +7,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.types import Camera
 from hooc_perception.ros.inputs.raw_frames import FrameRefused, RawFrames
 from hooc_perception.ros.messages import conversions as c
@@ -24,7 +25,8 @@ MILLIMETRES = c.image_message(np.full((H, W), 900, np.uint16), '16UC1', HEAD)
 def outcome(frames, image):
     """Return the median depth of an image in metres, or the code of its refusal."""
     try:
-        return round(float(np.median(frames.decode(image, INFO, STANDS, 4.0).depth)), 3)
+        depth = frames.decode(image, INFO, STANDS, ObserveConfig()).depth
+        return round(float(np.median(depth)), 3)
     except FrameRefused as refused:
         return refused.code
 

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import Camera, Observation, ObservedView, RectifiedView
 from hooc_perception.errors import HoocError
@@ -113,6 +114,31 @@ def test_poses_are_a_table_of_float64():
         assert row['r12'] == T[1, 2] and row['r20'] == T[2, 0]
 
 
+def test_a_table_elsewhere_in_the_target_frame():
+    views, T = [a_view('a', 1), a_view('b', 3)], np.eye(4)
+    T[:3, :3] = Rotation.from_rotvec([0.1, -0.2, 0.9]).as_matrix()
+    T[:3, 3] = 0.6, -0.1, 0.72
+    posed = [replace(view, camera=replace(view.camera, T_world_camera=T
+                                          @ view.camera.T_world_camera)) for view in views]
+    observation = observe(posed, ObserveConfig(), T)
+    again = o.observation_from_messages(*messages_of(observation))
+    assert again.T_target_table.tobytes() == T.tobytes()
+    for before, after in zip(observation.views, again.views, strict=True):
+        np.testing.assert_allclose(after.camera.T_world_camera, before.camera.T_world_camera,
+                                   rtol=0, atol=1e-14)
+        np.testing.assert_array_equal(after.foreground, before.foreground)
+        assert before.foreground.any()
+    # Where the cameras are is told in the target frame, and recordings without a table are read.
+    poses = o.poses_message(observation, HEAD)
+    rows = cloud_rows(poses)
+    np.testing.assert_allclose(rows['z'], [view.camera.T_world_camera[2, 3] for view in
+                                           observation.in_target_frame().views])
+    old = observe(views)
+    old_views, poses = messages_of(old)
+    earlier = columns_of(poses, [(n, 'f8') for n in NAMES])
+    same_bits(o.observation_from_messages(old_views, earlier), old)
+
+
 def changed(poses, **columns):
     """Return the message of poses with other values in some columns of the last row."""
     rows = cloud_rows(poses).copy()
@@ -140,6 +166,8 @@ NAMES = (*o.POSE_COLUMNS, o.NOISE_COLUMN)
     (lambda p: changed(p, **dict.fromkeys(o.POSE_COLUMNS, 0.0)), 'no rigid pose for b'),
     (lambda p: changed(p, **{f'r{i}{j}': -(i == j) for i in range(3) for j in range(3)}),
      'no rigid pose for b'),
+    (lambda p: changed(p, table_r00=0.5), 'no rigid pose for the table'),
+    (lambda p: changed(p, table_x=0.5), 'no pose of the table that are the same in every row'),
     (lambda p: changed(p, noise_m=np.nan), 'noise_m'),
     (lambda p: changed(p, noise_m=0.0), 'noise_m'),
     (lambda p: changed(p, noise_m=0.5), 'the same in every row'),

@@ -14,7 +14,9 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from geometry_msgs.msg import Point32, PolygonStamped  # noqa: E402
 from hooc_perception.core.types import Candidates, Energy, ParsedScene
+from hooc_perception.ros.messages.conversions import header
 from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_of
 from hooc_perception.ros.outputs.adapters.detections import covariance
 from hooc_perception.ros.outputs.adapters.guard import messages_of
@@ -68,6 +70,9 @@ class Node:
         from hooc_perception.chain import TOPICS
         assert topic in TOPICS
         return SimpleNamespace(publish=self.sent.setdefault(topic, []).append)
+
+    def subscription(self, kind, topic, callback):
+        self.hear = {**getattr(self, 'hear', {}), topic: callback}
 
     def create_timer(self, period, callback):
         self.timers.append(callback)
@@ -250,3 +255,36 @@ def test_real_packages_have_the_fields_of_the_stubs(stubs):
         assert list(real.get_fields_and_field_types()) == list(stub.__slots__)
     if len(missing) == len(stubs.DEFINITIONS):
         pytest.skip('none of the packages is installed')
+
+
+def outline(*corners):
+    """Return the message of scene/table with these corners in base_link."""
+    message = PolygonStamped(header=header(STAMP, 'base_link'))
+    message.polygon.points = [Point32(x=x, y=y, z=z) for x, y, z in corners]
+    return message
+
+
+def test_the_table_is_a_closed_slab_below_its_surface(stubs):
+    stubs.install('moveit_msgs')
+    node = Node(planning_scene='box')
+    adapters_of(node)
+    node.hear['scene/table'](outline((0.0, 0.0, 0.7), (1.0, 0.0, 0.7), (1.0, 0.8, 0.72),
+                                     (0.2, 0.9, 0.7225), (0.0, 0.5, 0.7125)))
+    _, read = stubs.cdr(node.sent['/planning_scene'][0])
+    slab, = read.world.collision_objects
+    assert (slab.id, slab.operation, slab.header.frame_id) == ('table', 0, 'base_link')
+    mesh = trimesh.Trimesh([xyz(v) for v in slab.meshes[0].vertices],
+                           [t.vertex_indices for t in slab.meshes[0].triangles], process=False)
+    assert mesh.is_watertight and mesh.is_winding_consistent
+    assert mesh.volume == pytest.approx(0.03 * 0.82, rel=0.01)      # outwards: positive
+    assert mesh.bounds[1, 2] == pytest.approx(0.7225 - 0.005, abs=1e-3)
+    # Results come and go, the table stays.
+    node.hear['scene/table'](outline())
+    assert len(node.sent['/planning_scene']) == 1
+
+
+def test_the_table_can_be_left_out(stubs):
+    stubs.install('moveit_msgs')
+    node = Node(planning_scene='box', planning_scene_table=False)
+    adapters_of(node)
+    assert not hasattr(node, 'hear')

@@ -34,6 +34,9 @@ class AdapterConfig(Config):
     planning_scene: str = param('off', 'Keep the objects in the planning scene of MoveIt, as '
                                 'their meshes or as their bounding boxes; needs moveit_msgs.',
                                 choices=('off', 'mesh', 'box'))
+    planning_scene_table: bool = param(
+        True, 'Keep the table of scene/table in the planning scene, too, as the object `table`: '
+        'a slab under what was seen of it.')
     planning_scene_ttl_s: float = param(
         10.0, 'An object that is missing from the results for this long is removed from the '
         'planning scene; 0 = at once.', 's', 0.0, 3600.0, runtime=True)
@@ -51,7 +54,8 @@ def adapters_of(node: StageNode) -> list[Adapter]:
     if config.publish_detections:
         chosen.append(Detections(node))
     if config.planning_scene != 'off':
-        chosen.append(PlanningSceneDiffs(node, config.planning_scene))
+        chosen.append(PlanningSceneDiffs(node, config.planning_scene,
+                                         config.planning_scene_table))
     return chosen
 
 

@@ -5,7 +5,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from geometry_msgs.msg import Point, Pose
+from geometry_msgs.msg import Point, PolygonStamped, Pose
+from hooc_perception.core.arrays import AnyArray, Float64Array
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, pose_message
 from hooc_perception.ros.outputs.adapters.guard import messages_of
@@ -15,6 +16,9 @@ from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from std_msgs.msg import Header
 
 CHECK_S = 0.5
+# The slab of the table lies so far below the surface, and is so thick: an object that stands on
+# the table, once attached to a gripper, should not count as a collision.
+TABLE_GAP_M, TABLE_THICKNESS_M = 0.005, 0.03
 
 
 class PlanningSceneDiffs:
@@ -24,10 +28,14 @@ class PlanningSceneDiffs:
     An object that is missing from a result may be hidden, perhaps by the robot: it stays for
     `planning_scene_ttl_s`. Without any results, all objects are removed after that time.
 
+    The table is added as it comes on scene/table and stays: a robot must not hit it whether or
+    not objects are known.
+
     :param shape: 'mesh' or 'box'.
+    :param table: whether to add the table.
     """
 
-    def __init__(self, node: StageNode, shape: str) -> None:
+    def __init__(self, node: StageNode, shape: str, table: bool) -> None:
         """Create the publisher; HoocError without moveit_msgs."""
         self._node, self._shape = node, shape
         self._messages = messages_of('moveit_msgs', 'planning_scene')
@@ -35,6 +43,8 @@ class PlanningSceneDiffs:
         # Name -> node time (ns) of the last result with the object.
         self._seen: dict[str, int] = {}
         self._frame, self._stamp_ns = '', 0     # of the last result
+        if table:
+            node.subscription(PolygonStamped, 'scene/table', self._on_table)
         node.owned(node.destroy_timer, node.create_timer(CHECK_S, node.guarded(
             self.expire, type(self).__name__, 'objects that are gone stay in the planning scene')))
 
@@ -49,6 +59,12 @@ class PlanningSceneDiffs:
         added = [collision_object(o, scene.header, self._shape, self._messages)
                  for o in scene.objects]
         self._send(added, gone + self._expired(now), scene.header)
+
+    def _on_table(self, outline: PolygonStamped) -> None:
+        """Add the table, or replace it where it was."""
+        slab = table_object(outline, self._messages)
+        if slab is not None:
+            self._send([slab], [], outline.header)
 
     def expire(self) -> None:
         """Remove the objects that have expired."""
@@ -103,18 +119,55 @@ def collision_object(found: DetectedObject, head: Header, shape: str, messages: 
     out = kind(header=head, id=found.name, operation=kind.ADD,
                pose=pose_message(found.translation, found.rotation_xyzw))
     out.type.key = found.category
-    here = Pose()
-    here.orientation.w = 1.0
+    here = _here()
     if shape == 'box':
         out.primitives = [SolidPrimitive(type=SolidPrimitive.BOX,
                                          dimensions=found.size.tolist())]
         out.primitive_poses = [here]
     else:
         scale = found.size / np.maximum(found.model.extents, 1e-9)
-        out.meshes = [Mesh(
-            vertices=[Point(x=x, y=y, z=z)
-                      for x, y, z in (found.model.vertices * scale).tolist()],
-            triangles=[MeshTriangle(vertex_indices=face)
-                       for face in found.model.faces.astype(np.uint32)])]
+        out.meshes = [_mesh(found.model.vertices * scale, found.model.faces)]
         out.mesh_poses = [here]
     return out
+
+
+def table_object(outline: PolygonStamped, messages: Any) -> Any:
+    """
+    Return the CollisionObject `table` of a convex outline; None where it encloses nothing.
+
+    :param outline: corners in order, counter-clockwise seen from above.
+    :param messages: the module moveit_msgs.msg.
+    """
+    top = np.array([(p.x, p.y, p.z) for p in outline.polygon.points]).reshape(-1, 3)
+    n = len(top)
+    normal = np.cross(top, np.roll(top, -1, axis=0)).sum(0) if n else np.zeros(3)
+    if n < 3 or not np.linalg.norm(normal):
+        return None
+    normal /= np.linalg.norm(normal)
+    vertices = np.concatenate([top - TABLE_GAP_M * normal,
+                               top - (TABLE_GAP_M + TABLE_THICKNESS_M) * normal])
+    faces = [(0, k, k + 1) for k in range(1, n - 1)]
+    faces += [(n, n + k + 1, n + k) for k in range(1, n - 1)]
+    for k in range(n):
+        after = (k + 1) % n
+        faces += [(k, n + k, n + after), (k, n + after, after)]
+    kind = messages.CollisionObject
+    out = kind(header=outline.header, id='table', operation=kind.ADD, pose=_here())
+    out.type.key = 'table'
+    out.meshes = [_mesh(vertices, np.array(faces, np.uint32))]
+    out.mesh_poses = [_here()]
+    return out
+
+
+def _here() -> Pose:
+    """Return the identity."""
+    pose = Pose()
+    pose.orientation.w = 1.0
+    return pose
+
+
+def _mesh(vertices: Float64Array, faces: AnyArray) -> Mesh:
+    """Return the shape_msgs Mesh of vertices (V, 3) in metres and faces (F, 3)."""
+    return Mesh(vertices=[Point(x=x, y=y, z=z) for x, y, z in vertices.tolist()],
+                triangles=[MeshTriangle(vertex_indices=face)
+                           for face in faces.astype(np.uint32)])

@@ -90,9 +90,10 @@ def test_a_parameter_without_effect_is_refused_by_name(name, key, belongs_to):
 @pytest.mark.parametrize('name', PROFILES)
 def test_every_parameter_can_be_set_by_its_flat_name(name):
     chosen = profile(name)
+    texts = {'workspace': '[[0, 0], [1, 1]]', 'ignore': '[[[0, 0], [1, 1]]]', 'table': 'find'}
     for stage in ('observe', 'classify', 'propose', 'parse'):
         for parameter, value in chosen.stage(stage).values().items():
             other = (not value if isinstance(value, bool) else value + 1 if isinstance(value, int)
-                     else 0.99 * value)
+                     else texts[parameter] if isinstance(value, str) else 0.99 * value)
             changed = with_overrides(chosen, {f'{stage}.{parameter}': other})
             assert changed.stage(stage).values()[parameter] == other

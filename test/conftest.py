@@ -2,6 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fixtures for all tests."""
 
+import importlib.util
 import os
 from pathlib import Path
 
@@ -23,3 +24,14 @@ def shared_scenes():
     if not path.is_dir():
         pytest.skip('no recorded scenes beside the repository (../shared/scenes)')
     return path
+
+
+@pytest.fixture(scope='session')
+def tabletop():
+    """Return the module of rendered tables with boxes and cylinders (tabletop.py)."""
+    spec = importlib.util.spec_from_file_location('tabletop', Path(__file__).with_name(
+        'tabletop.py'))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

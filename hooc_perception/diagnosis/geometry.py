@@ -12,6 +12,7 @@ from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Camera, ObservedView
+from hooc_perception.diagnosis.extrinsics import check_pairs
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.reader import BagScene
@@ -57,6 +58,7 @@ def check_geometry(path: Path, config: ObserveConfig = ObserveConfig()) -> Itera
         return
     for before, after in zip(rectified, observation.views):
         yield check_view(before.camera, after, config)
+    yield from check_pairs(observation)
     noise_mm = 1000 * observation.noise_m
     if noise_mm > NOISY_TABLE_MM:
         yield Finding(WARNING, 'table', f'its measured heights scatter by {noise_mm:.1f} mm, so '

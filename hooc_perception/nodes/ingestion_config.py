@@ -24,3 +24,7 @@ class IngestionConfig(FrameSetConfig, CameraInputConfig):
     explain_after_s: float = param(
         3.0, 'A camera that has been silent for this time is diagnosed, and again while it stays '
         'silent; 0 = never.', 's', 0.0, 3600.0, runtime=True)
+    check_extrinsics_s: float = param(
+        30.0, 'Time between two checks whether the cameras agree about the surfaces that two of '
+        'them see; a check takes a few tenths of a second. 0 = never.', 's', 0.0, 3600.0,
+        runtime=True)

@@ -9,6 +9,7 @@ from typing import Any
 
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.chain import INGESTION
+from hooc_perception.core.extrinsics.residual import pair_residuals
 from hooc_perception.core.segment.checks import table_trouble
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.observe import observe
@@ -27,6 +28,7 @@ from hooc_perception.nodes.assembly import Assembly
 from hooc_perception.nodes.ingestion_config import IngestionConfig
 from hooc_perception.nodes.model import camera_names
 from hooc_perception.nodes.pace import Pace
+from hooc_perception.nodes.rig_health import RigHealth
 from hooc_perception.nodes.warm_up import overhead_camera
 from hooc_perception.ros.inputs.camera_input import CameraInput
 from hooc_perception.ros.inputs.camera_poses import PoseParameters, TfPoses
@@ -83,12 +85,14 @@ class Ingestion:
         self.assembly = Assembly(node, self._names)
         if node.config.warm_up:
             flat = DepthView(overhead_camera(), np.ones((120, 160), np.float32))
-            observe([rectify(flat, node.observe_config)], node.observe_config)
+            pair_residuals(observe([rectify(flat, node.observe_config)] * 2,
+                                   node.observe_config))
         self.number = 0            # of sets that were sent
         self.output = ViewOutput(node, self._names)
         self._table, self._table_output = TableTracker(), TableOutput(node)
         self._refused = node.publisher(Header, 'views/refused')
         self.pace = Pace(node, self._send_if_complete)
+        self._rig_health = RigHealth(node)
         for name in self._names:
             node.poses.declare(name)
             node.topics.declare(name)
@@ -178,6 +182,7 @@ class Ingestion:
             cameras=sum(frame is not None for frame in frame_set.frames),
             seconds=time.monotonic() - start)
         self._report_table(table, views, frame_set, head)
+        self._rig_health.check(observation)
 
     def _report_table(self, table: Table, views: Sequence[RectifiedView],
                       frame_set: FrameSet[RawFrame], head: Header) -> None:

@@ -58,6 +58,10 @@ class Diagnostics:
         if self._state.get(subject, (OK, ''))[1] == code:
             self.ok(subject)
 
+    def values(self, subject: str, **values: Any) -> None:
+        """Publish values with a subject, whatever its state."""
+        self._values.setdefault(subject, {}).update(values)
+
     def state(self, subject: str, code: str, sentence: str, level: bytes = OK) -> None:
         """Report an intended state until the next report; it is neither logged nor counted."""
         self._state[subject] = (level, code, sentence, time.monotonic() - HOLD_S)

@@ -76,7 +76,7 @@ def test_a_set_that_stage_1_cannot_use_is_refused_by_ingestion(bench, make_chain
     answers = bench.hear(PoseArray, 'objects/poses', qos('objects/poses'))
     refused = bench.hear(Header, 'views/refused', qos('views/refused'))
 
-    def fail(views, config):
+    def fail(*given):
         raise error
     with monkeypatch.context() as patch:
         patch.setattr(ingestion_node, 'observe', fail)

@@ -19,7 +19,7 @@ HELP = ('Diagnose this installation or the given bags. Every finding is one sent
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument('bags', metavar='BAG', nargs='*', type=Path,
-                        help='bag to check: a rosbag2 folder or an .mcap or .db3 file')
+                        help='bag to check: a rosbag2 folder, or an .mcap, .db3 or .bag file')
     parser.add_argument('--model', type=Path, metavar='MODEL',
                         help='also check whether this model fits the cameras of the bags')
     parser.add_argument('--salvage', type=Path, metavar='NEW_BAG',

@@ -17,7 +17,7 @@ HELP = ('Play a bag as live cameras under /hooc: wait until every camera has a s
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments of `hooc replay`."""
     parser.add_argument('bag', type=Path, metavar='BAG',
-                        help='rosbag2 folder, .mcap or .db3 file')
+                        help='rosbag2 folder, or .mcap, .db3 or (ROS 1) .bag file')
     parser.add_argument('--rate', type=float, default=1.0, metavar='R',
                         help='speed relative to the recording; 0 = as fast as the chain answers '
                         '(default: %(default)g)')
@@ -40,8 +40,8 @@ def run(args: Namespace) -> None:
     if not 0 <= args.rate <= 100 or not args.wait > 0:
         raise HoocError('--rate must be from 0 to 100 and --wait positive')
     bag = BagScene(args.bag)
-    if bag.incomplete:
-        print(f'warning: {bag.incomplete}', file=sys.stderr)
+    for warning in bag.warnings:
+        print(f'warning: {warning}', file=sys.stderr)
     parameters = {REPLAY: {'bag': str(args.bag.resolve()), 'rate': args.rate, 'loop': args.loop,
                            'match_timeout_s': args.wait}}
     with Supervisor((REPLAY,), parameters, args.namespace) as supervisor:

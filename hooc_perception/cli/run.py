@@ -96,17 +96,19 @@ def check_bags(bags: 'Sequence[BagScene]', record: Path | None) -> None:
         if record and (record / bag.name).exists():
             raise HoocError(f'--record {record / bag.name} exists already; remove it or choose '
                             'another folder')
-        if bag.incomplete:
-            print(f'warning: {bag.incomplete}', file=sys.stderr)
+        for warning in bag.warnings:
+            print(f'warning: {warning}', file=sys.stderr)
         bag.views()
 
 
 def bag_paths(given: Iterable[Path]) -> list[Path]:
     """Return the given bags, a folder of bags replaced by what it holds."""
+    from hooc_perception.io.bags.folder import is_bag
     paths: list[Path] = []
     for path in given:
-        inside = sorted(p.parent for p in path.glob('*/metadata.yaml')) if path.is_dir() else []
-        paths += [path] if (path / 'metadata.yaml').is_file() or not inside else inside
+        inside = sorted(p for p in path.iterdir() if is_bag(p)) if (
+            path.is_dir() and not is_bag(path)) else []
+        paths += inside or [path]
     return paths
 
 

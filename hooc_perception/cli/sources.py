@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
+from hooc_perception.io.bags.folder import is_bag
 from hooc_perception.io.bags.reader import BagScene
 from hooc_perception.io.scenes.scene_set import load_scene_set, SceneSet
 from hooc_perception.trained.folder import ModelFolder
-
-BAG_SUFFIXES = ('.mcap', '.db3')
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +35,6 @@ class BagSet:
                 raise HoocError(f'{self.path}: there is no scene {name!r}; the bag holds '
                                 f'{self.scenes[0].name}')
         return self
-
-
-def is_bag(path: Path) -> bool:
-    """Return whether `path` is a rosbag2 folder, or the .mcap or .db3 file of one."""
-    return (path / 'metadata.yaml').is_file() or path.suffix in BAG_SUFFIXES and path.is_file()
 
 
 def load_source(path: str | Path, model: ModelFolder) -> SceneSet | BagSet:

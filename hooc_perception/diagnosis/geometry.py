@@ -45,8 +45,8 @@ def check_geometry(path: Path, config: ObserveConfig = ObserveConfig()) -> Itera
     """Yield a Finding for each check of poses, table and foreground."""
     try:
         bag = BagScene(path)
-        if bag.incomplete:
-            yield Finding(WARNING, 'cameras', bag.incomplete)
+        for warning in bag.warnings:
+            yield Finding(WARNING, 'bag', warning)
         if not bag.table_known:
             yield Finding(WARNING, 'world frame', 'no frame is known to be the table, so it is '
                           'estimated from the depth; publish a frame called "table" on '

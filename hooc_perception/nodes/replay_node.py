@@ -91,8 +91,8 @@ class Replay:
         if not node.config.bag:
             raise HoocError('parameter bag is empty; set it to a rosbag2 folder or file')
         self._bag = BagScene(node.config.bag)
-        if self._bag.incomplete:
-            node.diagnostics.warn('bag', 'missing_camera', self._bag.incomplete)
+        for warning in self._bag.warnings:
+            node.diagnostics.warn('bag', 'incomplete', warning)
         self._frame = self._bag.info['world_frame'] or 'table'
         self._cameras: dict[str, Camera] = {camera.name: camera for camera in self._bag.cameras}
         self._outputs = {name: CameraOutput(

@@ -4,8 +4,9 @@
 
 from dataclasses import replace
 
-from hooc_perception.cli.sources import is_bag, load_source, provenance
+from hooc_perception.cli.sources import load_source, provenance
 from hooc_perception.errors import HoocError
+from hooc_perception.io.bags.folder import is_bag
 from hooc_perception.io.bags.reader import BagScene
 from hooc_perception.trained.folder import load_model_folder
 import numpy as np

@@ -2,23 +2,19 @@
 # SPDX-License-Identifier: Apache-2.0
 """Open bags of any origin and iterate over their messages; every failure is a HoocError."""
 
+from collections import defaultdict
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager, ExitStack
+from dataclasses import dataclass, replace
+import heapq
 from pathlib import Path
 from typing import Any
 
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.bag_format import TYPES
-from hooc_perception.io.bags.mcap_checks import check_mcap
-from hooc_perception.io.scenes import files
-from rosbags.interfaces import (
-    Connection,
-    ConnectionExtRosbag2,
-    QosDurability,
-    QosReliability,
-)
-from rosbags.rosbag2 import Reader
+from hooc_perception.io.bags.folder import bag_files
+from hooc_perception.io.bags.storage import Channel, open_storage, Storage
+from mcap.stream_reader import CRCValidationError
 
 
 @dataclass(frozen=True)
@@ -27,8 +23,9 @@ class BagTopic:
     One topic of a bag.
 
     :ivar type_name: such as sensor_msgs/msg/Image.
-    :ivar latched: True if its publisher kept messages for late subscribers.
-    :ivar reliable: False if its publisher offered best effort.
+    :ivar count: number of messages, of all publishers.
+    :ivar latched: True if its publishers kept messages for late subscribers.
+    :ivar reliable: False if a publisher offered best effort.
     """
 
     name: str
@@ -40,7 +37,7 @@ class BagTopic:
 
 @dataclass(frozen=True)
 class BagMessage:
-    """One message: `data` is CDR as recorded, `time_ns` the time of recording."""
+    """One message: `data` is CDR, whatever was recorded; `time_ns` is the time of recording."""
 
     topic: BagTopic
     time_ns: int
@@ -58,66 +55,66 @@ class BagMessage:
 
 def topics(path: str | Path) -> dict[str, BagTopic]:
     """Return {topic name: BagTopic} of a bag."""
-    with _reading(path) as reader:
-        return {connection.topic: _topic(connection) for connection in reader.connections}
+    with _reading(path) as storages:
+        return _merged(storages)
 
 
 def iter_messages(path: str | Path, names: Collection[str] | None = None) -> Iterator[BagMessage]:
     """
     Yield every BagMessage of a bag in the order of time.
 
-    :param path: a rosbag2 folder, or its .mcap or .db3 file.
+    Left out is what cannot be CDR: protobuf or JSON, and messages of ROS 1 of unknown types.
+
+    :param path: a rosbag2 folder, or a .mcap, .db3 or (ROS 1) .bag file, zstd-compressed or not.
     :param names: topic names to keep, None = all.
     :raises HoocError: if the bag is missing, truncated or not a bag.
     """
-    with _reading(path) as reader:
-        chosen = [c for c in reader.connections if names is None or c.topic in names]
-        known = {connection.id: _topic(connection) for connection in chosen}
-        # An empty choice would mean "all" to rosbags.
-        for connection, time_ns, data in reader.messages(chosen) if chosen else ():
-            yield BagMessage(known[connection.id], time_ns, bytes(data))
+    with _reading(path) as storages:
+        known = _merged(storages)
+        wanted = {name for name in known if names is None or name in names}
+        parts = [storage.messages(wanted) for storage in storages]
+        for channel, time_ns, data in heapq.merge(*parts, key=lambda message: message[1]):
+            topic = known[channel.topic]
+            if channel.type_name != topic.type_name:
+                topic = replace(topic, type_name=channel.type_name)
+            yield BagMessage(topic, time_ns, data)
+
+
+def oddities(path: str | Path) -> list[str]:
+    """Return what is odd about the files of a bag though they can be read, in sentences."""
+    return bag_files(Path(path))[1]
 
 
 @contextmanager
-def _reading(path: str | Path) -> Iterator[Reader]:
-    """Open a bag; whatever rosbags raises on damaged bytes becomes a HoocError."""
+def _reading(path: str | Path) -> Iterator[list[Storage]]:
+    """Open the files of a bag; whatever is raised on damaged bytes becomes a HoocError."""
     path = Path(path)
-    if not path.exists():
-        raise HoocError(f'{path}: there is no such bag; give a rosbag2 folder or an .mcap file')
-    if path.is_dir() and not (path / 'metadata.yaml').is_file():
-        raise HoocError(f'{path}: metadata.yaml is missing, so this is not a rosbag2 folder or '
-                        'its recording was interrupted; run "ros2 bag reindex" or record again')
-    if path.is_dir():
-        # Size and depth of the YAML are bounded here; rosbags has no limits.
-        _check_compression(path, files.read_yaml(path / 'metadata.yaml'))
-    for file in path.glob('*.mcap') if path.is_dir() else [path]:
-        if file.suffix == '.mcap' and file.is_file():
-            check_mcap(file)
+    files, _ = bag_files(path)
     try:
-        with Reader(path) as reader:
-            yield reader
+        with ExitStack() as stack:
+            yield [stack.enter_context(open_storage(file)) for file in files]
     except (HoocError, GeneratorExit, KeyboardInterrupt):
         raise
     except Exception as error:
-        reason = ' '.join(str(error).split())[:160] or type(error).__name__
+        reason = ('a checksum differs' if isinstance(error, CRCValidationError)
+                  else ' '.join(str(error).split())[:160] or type(error).__name__)
         raise HoocError(f'{path}: the bag is truncated, damaged or not a bag ({reason}); '
                         'copy it again, or save what is left with hooc doctor --salvage') from None
 
 
-def _check_compression(path: Path, metadata: dict[str, Any]) -> None:
-    """Reject compression of whole files or single messages: their size has no bound."""
-    info = metadata.get('rosbag2_bagfile_information')
-    mode = str(info.get('compression_mode') or '').lower() if isinstance(info, dict) else ''
-    if mode not in ('', 'none', 'storage'):
-        raise HoocError(f'{path}: the bag is compressed by {mode}; rewrite it with "ros2 bag '
-                        'convert" (MCAP with its own compression is read)')
+def _merged(storages: Collection[Storage]) -> dict[str, BagTopic]:
+    """Return {topic name: BagTopic} of several files and publishers."""
+    channels: defaultdict[str, list[Channel]] = defaultdict(list)
+    for storage in storages:
+        for channel in storage.channels:
+            channels[channel.topic].append(channel)
+    return {name: _topic(name, found) for name, found in channels.items()}
 
 
-def _topic(connection: Connection) -> BagTopic:
-    """Return the BagTopic of a rosbags connection; unknown QoS counts as reliable."""
-    assert isinstance(connection.ext, ConnectionExtRosbag2)
-    profiles = connection.ext.offered_qos_profiles
-    return BagTopic(
-        connection.topic, connection.msgtype, connection.msgcount,
-        bool(profiles) and all(q.durability == QosDurability.TRANSIENT_LOCAL for q in profiles),
-        all(q.reliability != QosReliability.BEST_EFFORT for q in profiles))
+def _topic(name: str, channels: list[Channel]) -> BagTopic:
+    """Return the BagTopic of all channels of a name; those without messages say nothing."""
+    speaking = [channel for channel in channels if channel.count] or channels
+    most = max(speaking, key=lambda channel: channel.count)
+    return BagTopic(name, most.type_name, sum(channel.count for channel in channels),
+                    all(channel.latched for channel in speaking),
+                    all(channel.reliable for channel in speaking))

@@ -21,6 +21,7 @@ from hooc_perception.io.bags.mcap_format import (
     RECORD_HEAD,
     records,
 )
+from hooc_perception.io.bags.storage import as_cdr, ros2_type
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Message, Schema
@@ -104,7 +105,7 @@ class _McapSalvager:
     def __init__(self, found: Salvage) -> None:
         self._found = found
         self._schemas: dict[int, str] = {}
-        self._channels: dict[int, tuple[str, str, bool]] = {}
+        self._channels: dict[int, tuple[str, str, bool, str]] = {}
 
     def read_file(self, data: bytes) -> None:
         """Add the messages of a whole file."""
@@ -159,12 +160,14 @@ class _McapSalvager:
                 # Profiles are YAML of any version: 1 or transient_local.
                 profile = channel.metadata.get('offered_qos_profiles', '')
                 latched = 'durability: 1' in profile or 'durability: transient_local' in profile
-                self._channels[channel.id] = (channel.topic, self._schemas[channel.schema_id],
-                                              latched)
+                self._channels[channel.id] = (
+                    channel.topic, ros2_type(self._schemas[channel.schema_id]), latched,
+                    channel.message_encoding)
             elif opcode == Opcode.MESSAGE:
                 message = Message.read(stream, len(content))
-                topic, type_name, latched = self._channels[message.channel_id]
-                self._found.add(SalvagedMessage(topic, type_name, message.data, message.log_time,
+                topic, type_name, latched, encoding = self._channels[message.channel_id]
+                data = as_cdr(message.data, type_name, encoding)
+                self._found.add(SalvagedMessage(topic, type_name, data, message.log_time,
                                                 latched))
         except Exception as error:      # damaged bytes fail in many ways
             self._found.note(f'a record is lost ({type(error).__name__})')

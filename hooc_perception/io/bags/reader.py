@@ -23,7 +23,7 @@ from hooc_perception.io.bags.camera_topics import (
     depth_topics,
 )
 from hooc_perception.io.bags.contents import read_contents
-from hooc_perception.io.bags.files import BagMessage, BagTopic, iter_messages, topics
+from hooc_perception.io.bags.files import BagMessage, BagTopic, iter_messages, oddities, topics
 from hooc_perception.io.bags.frames import FrameTree, plain
 from hooc_perception.io.depth_encodings import decode_depth, decode_image
 from hooc_perception.io.scenes.scene import TrueObject
@@ -52,7 +52,7 @@ class BagScene(TableFrameScene):
         """
         Read everything but the images.
 
-        :param path: a rosbag2 folder, or its .mcap or .db3 file.
+        :param path: a rosbag2 folder, or a .mcap, .db3 or .bag file.
         :param world_frame: a frame of the bag with z up and z = 0 on the table top; None takes
             that of scene_info, else `table`, else estimates it from the depth.
         :raises HoocError: if the bag is damaged, has no depth, or lacks a calibration.
@@ -78,14 +78,16 @@ class BagScene(TableFrameScene):
             for camera in cameras)
 
     @property
-    def incomplete(self) -> str | None:
-        """Return a sentence that names the cameras without any depth image, None for none."""
+    def warnings(self) -> tuple[str, ...]:
+        """Return what the user should know though the bag can be used, in sentences."""
+        sentences = oddities(self.path)
         names = cameras_without_depth(self.topics, self.depth_topics, self.info['cameras'])
-        if not names:
-            return None
-        return (f'{self.path}: there is no depth image of {", ".join(names)}, though the bag '
-                'names it as a camera, so only '
-                f'{", ".join(self.depth_topics)} will be used; record its depth topic, too')
+        if names:
+            sentences.append(
+                f'{self.path}: there is no depth image of {", ".join(names)}, though the bag '
+                f'names it as a camera, so only {", ".join(self.depth_topics)} will be used; '
+                'record its depth topic, too')
+        return tuple(sentences)
 
     @property
     def truth(self) -> tuple[TrueObject, ...] | None:

@@ -9,8 +9,11 @@ import struct
 
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.bag_format import TYPES
+from hooc_perception.io.bags.folder import storage_files
 from hooc_perception.io.bags.mcap_salvage import Salvage, salvage_mcap, SalvagedMessage
 from hooc_perception.io.bags.raw_writer import RawBagWriter
+from hooc_perception.io.bags.storage import as_cdr, CDR
+from hooc_perception.io.bags.zstd import SUFFIXES, unpack_file
 
 # A database is taken to end after this many missing rows in succession.
 MAX_MISSING_ROWS = 1000
@@ -22,16 +25,19 @@ def salvage_bag(path: str | Path, keep: bool = True) -> Salvage:
     Return the readable messages of a bag in the order of time.
 
     :param path: a rosbag2 folder, with or without metadata.yaml, or its .mcap or .db3 file.
+        Of what is compressed with zstd, nothing behind a damaged byte can be recovered.
     :param keep: False counts the messages without keeping them.
     :raises HoocError: if there is no such file.
     """
     path = Path(path)
-    files = sorted(p for p in path.iterdir() if p.suffix in ('.mcap', '.db3')) if (
-        path.is_dir()) else [path]
-    files = [file for file in files if file.is_file()]
+    files = [file for file in (storage_files(path) if path.is_dir() else [path])
+             if file.is_file()]
     if not files:
         raise HoocError(f'{path}: there is no .mcap or .db3 file, so nothing can be salvaged; '
                         'look for the recording elsewhere')
+    if files[0].suffix == '.bag':
+        raise HoocError(f'{path}: bags of ROS 1 are repaired by "rosbag reindex", on a copy')
+    files = [unpack_file(file) if file.suffix in SUFFIXES else file for file in files]
     found = Salvage(sum(file.stat().st_size for file in files), keep, _readable)
     for file in files:
         (_salvage_database if file.suffix == '.db3' else salvage_mcap)(file, found)
@@ -70,8 +76,8 @@ def _salvage_database(path: Path, found: Salvage) -> None:
                 missing = 0 if row else missing + 1
                 if row and row[0] in topics:
                     topic, type_name, latched = topics[row[0]]
-                    found.add(SalvagedMessage(topic, type_name, bytes(row[2]), int(row[1]),
-                                              latched))
+                    data = as_cdr(bytes(row[2]), type_name, CDR)
+                    found.add(SalvagedMessage(topic, type_name, data, int(row[1]), latched))
     except (sqlite3.Error, TypeError, ValueError) as error:
         reason = ' '.join(str(error).split())[:120]
         found.note(f'the database cannot be read further ({reason})')

@@ -241,22 +241,6 @@ def test_damage_anywhere_is_an_error_or_harmless(tmp_path):
             assert '\n' not in str(error)
 
 
-def test_missing_metadata(tmp_path):
-    bag = write(tmp_path / 'b', GOOD)
-    (bag / 'metadata.yaml').unlink()
-    with pytest.raises(HoocError, match=r'metadata\.yaml is missing.*reindex'):
-        BagScene(bag)
-    assert BagScene(bag / 'b.mcap').depth_topics == {'c': '/c/depth/image_raw'}
-
-
-@pytest.mark.parametrize('content', ['', '- 1', '[' * 100_000, 'rosbag2_bagfile_information: {}'])
-def test_metadata_that_is_none(tmp_path, content):
-    bag = write(tmp_path / 'b', GOOD)
-    (bag / 'metadata.yaml').write_text(content)
-    with pytest.raises(HoocError, match='metadata.yaml|damaged or not a bag'):
-        BagScene(bag)
-
-
 @pytest.mark.parametrize('name', ['none', 'text.mcap', 'text.txt', 'text.db3'])
 def test_no_bag_at_all(tmp_path, name):
     if name != 'none':

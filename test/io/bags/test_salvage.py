@@ -236,13 +236,3 @@ def test_notes_are_bounded(demo, tmp_path):
     path = tmp_path / 'notes.mcap'
     path.write_bytes(mcap_format.MAGIC + struct.pack('<BQ', 5, 0) * 5000)
     assert 0 < len(salvage_bag(path).notes) <= mcap_salvage.MAX_NOTES
-
-
-def test_files_and_messages_that_are_compressed_whole_are_refused(demo, tmp_path):
-    bag, _ = copy(demo, tmp_path)
-    text = (bag / 'metadata.yaml').read_text()
-    assert "compression_mode: ''" in text
-    (bag / 'metadata.yaml').write_text(
-        text.replace("compression_mode: ''", 'compression_mode: FILE'))
-    with pytest.raises(HoocError, match='ros2 bag convert'):
-        topics(bag)

@@ -15,6 +15,8 @@ EXTRA_OF: dict[str, str] = {
     'psutil': 'eval',
     'pyrender': 'view',
     'rerun': 'view',
+    'yourdfpy': 'robot',
+    'lxml': 'robot',
     'distributed': 'dask',
 }
 

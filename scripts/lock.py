@@ -28,6 +28,10 @@ HEADER = """\
 OVERRIDES = {'pyopengl': '3.1.10'}
 # Large, and only for `hooc report --rerun`.
 NOT_LOCKED = {'rerun-sdk'}
+# yourdfpy asks for trimesh with everything that it can make use of (ray casting, servers,
+# drawings). Reading a URDF needs none of it, and embreex has no wheel for aarch64.
+NOT_NEEDED = {'anyio', 'colorlog', 'embreex', 'h11', 'httpcore', 'httpx', 'mapbox-earcut', 'rtree',
+              'shapely', 'svg-path', 'vhacdx', 'xxhash'}
 
 
 def normalized(name: str) -> str:
@@ -64,8 +68,8 @@ def resolve(python: str, constraints: Path) -> tuple[str, dict[str, str]]:
                    '--report', str(report), '-r', str(requirements), '-c', str(constraints)]
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
         rows = json.loads(report.read_text())['install']
-    return version, {normalized(row['metadata']['name']): row['metadata']['version']
-                     for row in rows}
+    found = {normalized(row['metadata']['name']): row['metadata']['version'] for row in rows}
+    return version, {name: pin for name, pin in found.items() if name not in NOT_NEEDED}
 
 
 def main(pythons: list[str]) -> None:

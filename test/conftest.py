@@ -35,3 +35,46 @@ def tabletop():
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
+
+
+# Two links that turn about vertical axes 0.3 m above the table, and a gripper.
+ARM = """
+<robot name="arm">
+  <link name="base_link">
+    <visual><origin xyz="0 0 0.15"/><geometry><cylinder radius="0.05" length="0.3"/></geometry>
+    </visual>
+  </link>
+  <link name="upper">
+    <visual><origin xyz="0.15 0 0"/><geometry><box size="0.3 0.06 0.06"/></geometry></visual>
+  </link>
+  <link name="lower">
+    <visual><origin xyz="0.125 0 0" rpy="0 1.5707963 0"/>
+      <geometry><cylinder radius="0.03" length="0.25"/></geometry></visual>
+  </link>
+  <link name="tool">
+    <visual><geometry><sphere radius="0.04"/></geometry></visual>
+  </link>
+  <link name="flange"/>
+  <joint name="shoulder" type="continuous">
+    <parent link="base_link"/><child link="upper"/><origin xyz="0 0 0.3"/><axis xyz="0 0 1"/>
+  </joint>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/><child link="lower"/><origin xyz="0.3 0 0"/><axis xyz="0 0 1"/>
+    <limit lower="-2" upper="2" effort="1" velocity="1"/>
+  </joint>
+  <joint name="wrist" type="fixed">
+    <parent link="lower"/><child link="flange"/><origin xyz="0.25 0 0"/>
+  </joint>
+  <joint name="slide" type="prismatic">
+    <parent link="flange"/><child link="tool"/><axis xyz="1 0 0"/>
+    <mimic joint="elbow" multiplier="0.1" offset="0.02"/>
+    <limit lower="0" upper="1" effort="1" velocity="1"/>
+  </joint>
+</robot>
+"""
+
+
+@pytest.fixture(scope='session')
+def arm_urdf():
+    """Return the URDF of an arm: joints shoulder and elbow; links base_link to tool."""
+    return ARM

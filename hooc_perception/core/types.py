@@ -47,18 +47,32 @@ class Camera:
 
 @dataclass(frozen=True)
 class DepthView:
-    """One raw depth image: `depth` (H, W) float32 metres, NaN = none, still distorted."""
+    """
+    One raw depth image, still distorted.
+
+    :ivar depth: (H, W) float32 metres, NaN = none.
+    :ivar hidden: (H, W) bool, pixels where the robot hides the scene, whose readings do not
+        count; None = nowhere.
+    """
 
     camera: Camera
     depth: Float32Array
+    hidden: BoolArray | None = None
 
 
 @dataclass(frozen=True)
 class RectifiedView:
-    """One undistorted depth image: `depth` (H, W) float32 metres, NaN = none; camera.D = 0."""
+    """
+    One undistorted depth image; camera.D = 0.
+
+    :ivar depth: (H, W) float32 metres, NaN = none.
+    :ivar hidden: (H, W) bool, pixels where the robot hides the scene; `depth` is NaN there. None
+        = nowhere.
+    """
 
     camera: Camera
     depth: Float32Array
+    hidden: BoolArray | None = None
 
 
 @dataclass(frozen=True)
@@ -72,6 +86,8 @@ class ObservedView:
     :ivar foreground: (H, W) bool, measured points on or above the table's surface that do
         not belong to it.
     :ivar table: (H, W) bool, pixels whose ray meets the table inside its borders.
+    :ivar hidden: (H, W) bool, pixels where the robot hides the scene, so that nothing was
+        measured of it; None = nowhere.
     """
 
     camera: Camera
@@ -79,6 +95,7 @@ class ObservedView:
     background: Float32Array
     foreground: BoolArray
     table: BoolArray
+    hidden: BoolArray | None = None
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,7 @@ PACKAGES: dict[str, tuple[str, str]] = {
     'matplotlib': ('matplotlib', 'plots'), 'jinja2': ('Jinja2', 'reports'),
     'PIL': ('pillow', 'images'), 'tqdm': ('tqdm', 'progress bars'),
     'psutil': ('psutil', 'benchmarks'), 'rclpy': ('ros-jazzy-rclpy', 'the nodes'),
+    'yourdfpy': ('yourdfpy', 'masking a robot by its URDF'),
 }
 # Shared library -> the Debian and Ubuntu package that holds it.
 LIBRARIES = {'libusb-1.0.so.0': 'libusb-1.0-0', 'libGL.so.1': 'libgl1', 'libEGL.so.1': 'libegl1',

@@ -9,6 +9,7 @@ and the depth of the empty scene (foreground.py). Rectification itself comes bef
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.segment.config import ObserveConfig
@@ -39,6 +40,9 @@ def observe(views: Sequence[RectifiedView], config: ObserveConfig = ObserveConfi
     if not views:
         raise HoocError('there is no depth image to look at; give at least one camera')
     if not any(np.isfinite(view.depth).any() for view in views):
+        if any(view.hidden is not None for view in views):
+            raise HoocError('the robot hides every reading of the cameras; move it out of their '
+                            'view, or lower robot_padding_m')
         raise HoocError(f'the depth image of camera {views[0].camera.name} holds no reading '
                         'at all (every pixel is 0 or NaN), nor does any other; check the '
                         'sensors and the unit')
@@ -49,6 +53,6 @@ def observe(views: Sequence[RectifiedView], config: ObserveConfig = ObserveConfi
     noise_m = (float(np.clip(np.median(known), LEAST_SIGMA_M, MOST_SIGMA_M)) if known
                else DEFAULT_NOISE_M)
     return Observation(
-        tuple(against_table(camera, view.depth, sigma if np.isfinite(sigma) else noise_m, config,
-                            allowed)
+        tuple(replace(against_table(camera, view.depth, sigma if np.isfinite(sigma) else noise_m,
+                                    config, allowed), hidden=view.hidden)
               for view, (camera, sigma) in zip(views, fits)), noise_m, T_target_table)

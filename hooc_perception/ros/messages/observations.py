@@ -30,7 +30,7 @@ from sensor_msgs.msg import CameraInfo, Image, PointCloud2
 from std_msgs.msg import Header
 
 # Bits of a pixel in `views/<camera>/segments`.
-FOREGROUND, TABLE = 1, 2
+FOREGROUND, TABLE, HIDDEN = 1, 2, 4
 # The upper three rows of T_target_camera, row by row; x y z is where the camera is.
 POSE_COLUMNS = ('r00', 'r01', 'r02', 'x', 'r10', 'r11', 'r12', 'y', 'r20', 'r21', 'r22', 'z')
 # The same of T_target_table, equal in every row.
@@ -52,9 +52,11 @@ class ViewMessages:
 
 
 def segments_message(view: ObservedView, head: Header) -> Image:
-    """Return the mono8 Image of a view's masks: FOREGROUND and TABLE are bits of each pixel."""
-    return labels_message(view.foreground * np.uint8(FOREGROUND)
-                          | view.table * np.uint8(TABLE), head)
+    """Return the mono8 Image of a view's masks: FOREGROUND, TABLE and HIDDEN are its bits."""
+    bits = view.foreground * np.uint8(FOREGROUND) | view.table * np.uint8(TABLE)
+    if view.hidden is not None:
+        bits |= view.hidden * np.uint8(HIDDEN)
+    return labels_message(bits, head)
 
 
 def poses_message(observation: Observation, head: Header) -> PointCloud2:
@@ -151,24 +153,29 @@ def _view(name: str, messages: ViewMessages, T_world_camera: Float64Array) -> Ob
                      T_world_camera=T_world_camera)
     depth = depth_from_message(messages.depth)
     _check_size(camera, 'depth_rect', depth.shape)
-    foreground, table = _masks(camera, depth, messages.segments)
+    foreground, table, hidden = _masks(camera, depth, messages.segments)
     with np.errstate(over='ignore'):    # with absurd intrinsics
-        view = observed_view(camera, depth, foreground, table)
+        view = replace(observed_view(camera, depth, foreground, table),
+                       hidden=hidden if hidden.any() else None)
     if not np.isfinite(view.background[table]).all():
         raise HoocError(f'views/{name}/segments marks the table at pixels whose rays do not meet '
                         'it; is another node publishing on this topic?')
     return view
 
 
-def _masks(camera: Camera, depth: Float32Array, message: Image) -> tuple[BoolArray, BoolArray]:
-    """Return the (H, W) masks (foreground, table) of an Image; HoocError if it is no such."""
+def _masks(camera: Camera, depth: Float32Array,
+           message: Image) -> tuple[BoolArray, BoolArray, BoolArray]:
+    """Return the (H, W) masks (foreground, table, hidden) of an Image; HoocError if none."""
     segments = labels_from_message(message)
     _check_size(camera, 'segments', segments.shape)
     foreground = segments & FOREGROUND > 0
-    if segments.max(initial=0) > FOREGROUND | TABLE or not np.isfinite(depth[foreground]).all():
-        raise HoocError(f'views/{camera.name}/segments has unknown bits, or foreground at pixels '
-                        'without a reading; is another node publishing on this topic?')
-    return foreground, segments & TABLE > 0
+    hidden = segments & HIDDEN > 0
+    if (segments.max(initial=0) > FOREGROUND | TABLE | HIDDEN
+            or not np.isfinite(depth[foreground]).all() or np.isfinite(depth[hidden]).any()):
+        raise HoocError(f'views/{camera.name}/segments has unknown bits, foreground at pixels '
+                        'without a reading, or hidden pixels with one; is another node publishing '
+                        'on this topic?')
+    return foreground, segments & TABLE > 0, hidden
 
 
 def _check_size(camera: Camera, suffix: str, shape: tuple[int, ...]) -> None:

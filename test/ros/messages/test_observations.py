@@ -96,6 +96,29 @@ def test_the_example_of_the_bundled_scene(request):
     same_bits(o.observation_from_messages(*messages_of(observation)), observation)
 
 
+def half_hidden(view):
+    """Return a view whose left half the robot hides."""
+    hidden = np.zeros(view.depth.shape, bool)
+    hidden[:, :hidden.shape[1] // 2] = True
+    return replace(view, depth=np.where(hidden, np.float32(np.nan), view.depth), hidden=hidden)
+
+
+def test_what_the_robot_hides_passes_unchanged():
+    observation = observe([half_hidden(a_view('a', 1)), a_view('b', 2)])
+    again = o.observation_from_messages(*messages_of(observation))
+    same_bits(again, observation)
+    assert again.views[0].hidden[:, :60].all() and not again.views[0].hidden[:, 60:].any()
+    assert again.views[1].hidden is None
+
+
+def test_hidden_pixels_have_no_reading():
+    observation = observe([half_hidden(a_view('a', 1))])
+    views, poses = messages_of(observation)
+    wrong = replace(views['a'], depth=depth_message(a_view('a', 1).depth, HEAD))
+    with pytest.raises(HoocError, match='hidden pixels with one'):
+        o.observation_from_messages({'a': wrong}, poses)
+
+
 def test_segments_are_bits_of_an_image():
     view = observe([a_view('a', 1)]).views[0]
     message = o.segments_message(view, HEAD)

@@ -23,6 +23,8 @@ ALLOWED = {
     'io/bags': {'numpy', 'scipy', 'yaml', 'cv2', 'rosbags', 'mcap', 'lz4', 'zstandard',
                 'hooc_perception.core', 'hooc_perception.io.scenes',
                 'hooc_perception.io.depth_encodings'},
+    'robot': {'numpy', 'trimesh', 'yourdfpy', 'lxml', 'hooc_perception.core',
+              'hooc_perception.io.scenes.png'},
     'synthesis': {'numpy', 'scipy', 'numba', 'yaml', 'cv2', 'fcl', 'mujoco', 'trimesh',
                   'manifold3d', 'open3d', 'joblib', 'tqdm',
                   'hooc_perception.core', 'hooc_perception.objects', 'hooc_perception.io.scenes'},

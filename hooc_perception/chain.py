@@ -48,9 +48,9 @@ _LATER = CHAIN[1:]
 # Name without the namespace -> Topic. `<camera>` and `<category>` stand for any name. Four
 # messages deep: a node that is busy while the next frame set arrives still finds whole sets.
 TOPICS = {
-    '<camera>/depth/image_raw': Topic(4),
-    '<camera>/depth/camera_info': Topic(4),
-    '<camera>/extrinsics': Topic(1, latched=True),
+    '<camera>/depth/image_raw': Topic(4, needed_by=(INGESTION,)),
+    '<camera>/depth/camera_info': Topic(4, needed_by=(INGESTION,)),
+    '<camera>/extrinsics': Topic(1, latched=True, needed_by=(INGESTION,)),
     'views/<camera>/depth_rect': Topic(4, False, INGESTION, _LATER),
     'views/<camera>/camera_info': Topic(4, True, INGESTION, _LATER),
     'views/<camera>/segments': Topic(4, False, INGESTION, _LATER),

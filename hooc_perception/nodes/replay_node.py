@@ -17,6 +17,7 @@ from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.reader import BagScene, iter_messages
 from hooc_perception.ros.lifecycle.spin import run_node
+from hooc_perception.ros.lifecycle.stage_config import NodeConfig
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import (
     camera_info_message,
@@ -34,7 +35,7 @@ from std_msgs.msg import Header, String
 
 
 @dataclass(frozen=True)
-class ReplayConfig(PlayerConfig):
+class ReplayConfig(PlayerConfig, NodeConfig):
     """Parameters of the replay node."""
 
     bag: str = param('', 'The rosbag2 folder, or its .mcap or .db3 file.')

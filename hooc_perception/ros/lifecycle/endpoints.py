@@ -28,6 +28,7 @@ class EndpointNode(TolerantLifecycleNode):
     Make endpoints with the QoS of the table of topics, and destroy all of them together.
 
     :ivar diagnostics: the node's Diagnostics, published in every lifecycle state.
+    :ivar published: {topic: its row in the table of topics} of the lifecycle publishers.
     """
 
     def __init__(self, name: str, **kwargs: Any) -> None:
@@ -35,7 +36,7 @@ class EndpointNode(TolerantLifecycleNode):
         super().__init__(name, **{'namespace': '/hooc', **kwargs})
         self.diagnostics = Diagnostics(self)
         self._destructors: list[Callable[[], object]] = []
-        self._published: dict[str, str] = {}    # topic -> its row in the table of topics
+        self.published: dict[str, str] = {}
 
     def now_ns(self) -> int:
         """Return the node's time (simulated with use_sim_time) in nanoseconds."""
@@ -46,7 +47,7 @@ class EndpointNode(TolerantLifecycleNode):
         # rclpy annotates it as a plain Publisher.
         made = cast(LifecyclePublisher, self.create_lifecycle_publisher(
             kind, name or topic, qos(topic), qos_overriding_options=overridable()))
-        self._published[name or topic] = topic
+        self.published[name or topic] = topic
         return self.owned(self.destroy_lifecycle_publisher, made)
 
     def subscription(self, kind: type, topic: str, callback: Callable[[Any], object],
@@ -95,7 +96,7 @@ class EndpointNode(TolerantLifecycleNode):
 
     def destroy_endpoints(self) -> None:
         """Destroy everything that was made since the last call."""
-        self._published.clear()
+        self.published.clear()
         while self._destructors:
             self._destructors.pop()()
 

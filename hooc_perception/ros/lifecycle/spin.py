@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 PARENT_VARIABLE = 'HOOC_SUPERVISOR_PID'
 # Destroying a node takes less than a second.
 END_GRACE_S = 10
+# Ctrl-C reaches a process twice under ros2 launch: from the terminal and from launch.
+AGAIN_S = 1.0
 HEED_S = 0.2    # Python handles a signal only between two waits
 _PR_SET_PDEATHSIG = 1
 
@@ -40,12 +42,12 @@ def run_node(make_node: 'Callable[[], StageNode[Any, Any]]',
     :param args: the ROS arguments, None = those of the process.
     """
     try:
+        interrupt = _Interrupt()
         with suppress(ValueError):      # not in the main thread: signals are not ours
-            interrupt = _Interrupt()
             for number in (signal.SIGINT, signal.SIGTERM):
                 signal.signal(number, interrupt)
         end_with_parent()
-        return _run(make_node, args)
+        return _run(make_node, args, interrupt)
     except KeyboardInterrupt:
         return 0
 
@@ -57,18 +59,30 @@ def raise_interrupt(error: BaseException) -> None:
 
 
 class _Interrupt:
-    """Raise KeyboardInterrupt for the first signal; later ones do not disturb the shutdown."""
+    """
+    Raise KeyboardInterrupt for the first signal; later ones do not disturb the shutdown.
+
+    Compiled code that calls back into Python (llvmlite, while it compiles) ignores exceptions.
+    The next signal then raises again, and `heard` ends the loop.
+
+    :ivar heard: whether a signal has come.
+    :ivar leaving: set when the shutdown has begun.
+    """
 
     def __init__(self) -> None:
-        self._heard = False
+        self.heard = self.leaving = False
+        self._first = 0.0       # time.monotonic()
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
-        if not self._heard:
-            self._heard = True
+        again = self.heard and time.monotonic() - self._first < AGAIN_S
+        if not self.leaving and not again:
+            self._first = self._first if self.heard else time.monotonic()
+            self.heard = True
             raise KeyboardInterrupt
 
 
-def _run(make_node: 'Callable[[], StageNode[Any, Any]]', args: Sequence[str] | None) -> int:
+def _run(make_node: 'Callable[[], StageNode[Any, Any]]', args: Sequence[str] | None,
+         interrupt: '_Interrupt') -> int:
     # rclpy's own handlers would shut the context down first, and the node could not leave.
     rclpy.init(args=None if args is None else list(args),
                signal_handler_options=SignalHandlerOptions.NO)
@@ -77,7 +91,7 @@ def _run(make_node: 'Callable[[], StageNode[Any, Any]]', args: Sequence[str] | N
         node = make_node()
         executor = SingleThreadedExecutor()
         executor.add_node(node)
-        while ok():
+        while ok() and not interrupt.heard:
             executor.spin_once(timeout_sec=HEED_S)
     except (KeyboardInterrupt, ExternalShutdownException):
         pass
@@ -89,6 +103,7 @@ def _run(make_node: 'Callable[[], StageNode[Any, Any]]', args: Sequence[str] | N
         print(f'[ERROR] {error}', file=sys.stderr, flush=True)
         return 1
     finally:
+        interrupt.leaving = True
         if node is not None and ok():
             node.leave()
         with _no_longer_than(END_GRACE_S):

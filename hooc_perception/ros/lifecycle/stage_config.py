@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The parameters that every node of the chain has."""
+"""The parameters that every node has."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,20 @@ from hooc_perception.ros.lifecycle.parameters import fixed_param
 
 
 @dataclass(frozen=True)
-class StageConfig(Config):
+class NodeConfig(Config):
+    """Parameters of every node."""
+
+    autostart: bool = fixed_param(
+        False, 'Configure and activate by itself after the start, also after a restart; for '
+        'launch files and `ros2 run`.')
+    wait_for_stages: bool = param(
+        False, 'Activating waits up to 30 s until the nodes that need the topics of this one have '
+        'subscribed; with autostart, for as long as it takes until they are active. For '
+        'recordings, which publish every frame set only once.')
+
+
+@dataclass(frozen=True)
+class StageConfig(NodeConfig):
     """Parameters of every node of the chain."""
 
     model: str = param('', 'Folder that `hooc train` wrote.')
@@ -24,6 +37,3 @@ class StageConfig(Config):
                       '', 0, 2 ** 31 - 1)
     warm_up: bool = param(True, 'Run the stage on a synthetic scene while configuring, so that '
                           'the first result does not wait for compiled code.')
-    wait_for_stages: bool = param(
-        False, 'Activating waits up to 30 s until the later stages have subscribed, for '
-        'recordings, which publish every frame set only once.')

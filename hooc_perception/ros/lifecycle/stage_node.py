@@ -13,19 +13,20 @@ from hooc_perception.core.config import Config
 from hooc_perception.errors import HoocError
 from hooc_perception.ros.health.diagnostics import WARN
 from hooc_perception.ros.health.downstream import wait_for_consumers
+from hooc_perception.ros.lifecycle.autostart import Autostart
 from hooc_perception.ros.lifecycle.endpoints import EndpointNode
 from hooc_perception.ros.lifecycle.memory import give_back_memory
 from hooc_perception.ros.lifecycle.misaddressed import inert, misaddressed
 from hooc_perception.ros.lifecycle.parameters import Parameters
 from hooc_perception.ros.lifecycle.spin import raise_interrupt
-from hooc_perception.ros.lifecycle.stage_config import StageConfig
+from hooc_perception.ros.lifecycle.stage_config import NodeConfig, StageConfig
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 # The last messages of a node vanish with its publishers: they get this long to arrive.
 FAREWELL_S = 1.0
 
-ConfigT = TypeVar('ConfigT', bound=Config, covariant=True)
+ConfigT = TypeVar('ConfigT', bound=NodeConfig, covariant=True)
 WorkT = TypeVar('WorkT', covariant=True)
 
 
@@ -37,14 +38,14 @@ class StageNode(EndpointNode, Generic[ConfigT, WorkT]):
     the work together with its endpoints; they may implement `activate()`, `deactivate()` and
     `cleanup()`. A HoocError there makes the transition fail with its sentence in the log.
 
-    :cvar CONFIG: class of the node's own parameters; a StageConfig in nodes of the chain.
+    :cvar CONFIG: class of the node's own parameters.
     :ivar stages: the stages whose parameters the node has.
     :ivar parameters: the declared Parameters, those of the stages included.
     :ivar active: whether the node is active.
     :ivar since: monotonic seconds of the last activation.
     """
 
-    CONFIG: type[Config] = StageConfig
+    CONFIG: type[NodeConfig] = StageConfig
 
     def __init__(self, name: str, **kwargs: Any) -> None:
         """Declare all parameters; `kwargs` go to rclpy.node.Node."""
@@ -56,6 +57,8 @@ class StageNode(EndpointNode, Generic[ConfigT, WorkT]):
         self.parameters.declare('', self.CONFIG())
         for stage, default in self._stage_defaults().items():
             self.parameters.declare(stage, default)
+        if self.parameters.get('', NodeConfig).autostart:
+            Autostart(self)
 
     @property
     def config(self) -> ConfigT:
@@ -73,6 +76,10 @@ class StageNode(EndpointNode, Generic[ConfigT, WorkT]):
         """Return whether start-up parameters may still change."""
         machine = getattr(self, '_state_machine', None)
         return machine is None or machine.current_state[1] == 'unconfigured'
+
+    def is_inactive(self) -> bool:
+        """Return whether the node is configured, but not active."""
+        return self._state_machine.current_state[1] == 'inactive'
 
     def _stage_defaults(self) -> dict[str, Config]:
         """Return {stage: Config} of the profile that parameters or the model name."""
@@ -125,8 +132,8 @@ class StageNode(EndpointNode, Generic[ConfigT, WorkT]):
         def start() -> None:
             self.since = time.monotonic()
             LifecycleNode.on_activate(self, state)
-            if isinstance(self.config, StageConfig) and self.config.wait_for_stages:
-                wait_for_consumers(self, self._published)
+            if self.config.wait_for_stages:
+                wait_for_consumers(self, self.published)
             self.activate()
             self.active = True
             self.diagnostics.state('node', 'ok', 'ok')

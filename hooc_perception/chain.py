@@ -72,6 +72,8 @@ TOPICS = {
     'scene/table': Topic(1, True, INGESTION),
     'scene/unexplained': Topic(1, True, PARSING),
     'scene/summary': Topic(1, True, PARSING),
+    '/robot_description': Topic(1, latched=True),
+    '/joint_states': Topic(100),
     '/tf': Topic(100),
     '/planning_scene': Topic(10),
     'replay/status': Topic(1, True, REPLAY),

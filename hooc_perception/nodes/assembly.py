@@ -14,7 +14,9 @@ from hooc_perception.core.types import Camera, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.frame_sets import EXPLAINED, FrameSet, FrameSets, SILENT
 from hooc_perception.nodes.ingestion_config import IngestionConfig
+from hooc_perception.nodes.robot_view import RobotView
 from hooc_perception.nodes.warm_up import overhead_camera
+from hooc_perception.ros.inputs.joint_states import StateUnknown
 from hooc_perception.ros.inputs.raw_frames import FrameRefused, RawFrame, RawFrames
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import nanoseconds
@@ -34,13 +36,15 @@ class Assembly:
     :ivar frames: {camera: RawFrames}, which decode and fuse.
     """
 
-    def __init__(self, node: StageNode[IngestionConfig, Any], names: Sequence[str]) -> None:
+    def __init__(self, node: StageNode[IngestionConfig, Any], names: Sequence[str],
+                 robot: RobotView) -> None:
         """
         Assemble for a StageNode.
 
+        :param robot: sets the robot aside.
         :raises HoocError: if there are fewer cameras than `min_cameras`.
         """
-        self._node, self._names = node, tuple(names)
+        self._node, self._names, self._robot = node, tuple(names), robot
         if node.config.min_cameras > len(self._names):
             raise HoocError(self._too_few())
         self.sets: FrameSets[RawFrame] = FrameSets(self._names, node.config)
@@ -69,10 +73,21 @@ class Assembly:
         if reason in (None, 'superseded', 'time_jump'):
             if lost:
                 frames.forget()
-            frames.remember(frame.depth, config.fuse_frames)
+            self._remember(name, frame, observe_config)
             if reason != 'time_jump' and name not in self.sets.lost:
                 self._node.diagnostics.ok(name)
         return reason
+
+    def _remember(self, name: str, frame: RawFrame, config: ObserveConfig) -> None:
+        """Keep a frame for fusion, without the robot: it moves, and should not become a median."""
+        frames, fuse = self.frames[name], self._node.config.fuse_frames
+        if fuse > 1:
+            try:
+                frame = self._robot.hide(frame, name, config)
+            except StateUnknown:        # reported when its frame set is refused
+                frames.forget()
+                return
+        frames.remember(frame.depth, fuse)
 
     def take(self) -> FrameSet[RawFrame] | None:
         """Return the next frame set, None while there is none."""
@@ -86,6 +101,7 @@ class Assembly:
 
         :return: (views in camera order; per camera the (H, W) number of readings that each
             pixel is fused from, None if nothing was fused).
+        :raises StateUnknown: if nobody says where the robot was.
         """
         views, counts = [], []
         for name, frame in zip(self._names, frame_set.frames):
@@ -93,6 +109,7 @@ class Assembly:
                 views.append(blind_view(name, self.frames[name].camera))
                 counts.append(None)
                 continue
+            frame = self._robot.hide(frame, name, config)
             view, count = self.frames[name].view(frame)
             views.append(rectify(view, config))
             counts.append(None if count is None else rectified_numbers(count, view.camera))

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 from hooc_perception.core.config import param
 from hooc_perception.io.frame_sets import FrameSetConfig
+from hooc_perception.nodes.robot_config import RobotConfig
 from hooc_perception.ros.inputs.camera_input import CameraInputConfig
 
 
 @dataclass(frozen=True)
-class IngestionConfig(FrameSetConfig, CameraInputConfig):
+class IngestionConfig(FrameSetConfig, RobotConfig, CameraInputConfig):
     """Parameters of the ingestion node."""
 
     wait_for_answer_s: float = param(

@@ -29,10 +29,12 @@ from hooc_perception.nodes.ingestion_config import IngestionConfig
 from hooc_perception.nodes.model import camera_names
 from hooc_perception.nodes.pace import Pace
 from hooc_perception.nodes.rig_health import RigHealth
+from hooc_perception.nodes.robot_view import RobotView
 from hooc_perception.nodes.warm_up import overhead_camera
 from hooc_perception.ros.inputs.camera_input import CameraInput
 from hooc_perception.ros.inputs.camera_poses import PoseParameters, TfPoses
 from hooc_perception.ros.inputs.camera_topics import CameraTopics, TopicParameters
+from hooc_perception.ros.inputs.joint_states import StateUnknown
 from hooc_perception.ros.inputs.raw_frames import RawFrame
 from hooc_perception.ros.lifecycle.spin import run_node
 from hooc_perception.ros.lifecycle.stage_node import StageNode
@@ -73,6 +75,7 @@ class Ingestion:
     The work of a configured ingestion node.
 
     :ivar assembly: the Assembly of frame sets.
+    :ivar robot: the RobotView that sets the robot aside.
     :ivar pace: the Pace at which they are sent.
     :ivar output: the ViewOutput that they are sent by.
     :ivar inputs: one CameraInput per camera.
@@ -82,7 +85,11 @@ class Ingestion:
     def __init__(self, node: IngestionNode) -> None:
         """Build everything on the node."""
         self._node, self._names = node, camera_names(node)
-        self.assembly = Assembly(node, self._names)
+        self._tf = TfPoses(node)
+        self.robot = RobotView(node, self._names, self._tf, self._on_robot_state)
+        self.assembly = Assembly(node, self._names, self.robot)
+        # A set that waits for the state of the robot at its stamps.
+        self._held: FrameSet[RawFrame] | None = None
         if node.config.warm_up:
             flat = DepthView(overhead_camera(), np.ones((120, 160), np.float32))
             pair_residuals(observe([rectify(flat, node.observe_config)] * 2,
@@ -96,7 +103,6 @@ class Ingestion:
         for name in self._names:
             node.poses.declare(name)
             node.topics.declare(name)
-        self._tf = TfPoses(node)
         self.inputs = [CameraInput(node, name, topics, node.poses, self._tf, self._on_frame)
                        for name, topics in self._topics().items()]
         node.steady_timer(0.5, self._on_timer)
@@ -117,6 +123,7 @@ class Ingestion:
         """Begin to listen; what was heard before does not count."""
         self.assembly.sets.clear()
         self.pace.forget()
+        self._held = None
         for camera in self.inputs:
             camera.begin()
 
@@ -151,10 +158,18 @@ class Ingestion:
     def _send_if_complete(self) -> None:
         """Publish the next frame set if there is one and the chain is free for it."""
         busy = self.pace.is_busy(self._node.config.wait_for_answer_s)
-        frame_set = None if busy else self.assembly.take()
+        frame_set = self._held or (None if busy else self.assembly.take())
         self.assembly.report()
         if frame_set is not None:
-            self._send(frame_set)
+            ready = self.robot.is_ready(zip(self._names, frame_set.frames))
+            self._held = None if ready else frame_set
+            if ready:
+                self._send(frame_set)
+
+    def _on_robot_state(self) -> None:
+        """Send the set that waited for it."""
+        if self._held is not None and self._node.active:
+            self._send_if_complete()
 
     def _send(self, frame_set: FrameSet[RawFrame]) -> None:
         """Observe a frame set and publish it, or refuse it."""
@@ -165,8 +180,11 @@ class Ingestion:
             code = 'refused'
             table = self._table.update(views, node.observe_config)
             observation = observe(views, node.observe_config, table.T_target_table)
+            self.robot.check(observation)
         except HoocError as error:
-            node.diagnostics.error('views', code, f'{error}; the set is dropped')
+            thing, code = (('robot', error.code) if isinstance(error, StateUnknown)
+                           else ('views', code))
+            node.diagnostics.error(thing, code, f'{error}; the set is dropped')
             self._refused.publish(head)
             return
         except Exception:

@@ -19,7 +19,8 @@ NODES = {'ingestion_node': 'IngestionNode', 'classification_node': 'Classificati
 COMMON = re.compile(r'.*/(parameter_events|rosout|transition_event|diagnostics|clock|tf|'
                     r'tf_static)$')
 # There only with a parameter, or on installations with more packages.
-OPTIONAL = {'objects/detections', '/tf', '/planning_scene', 'views/<camera>/count'}
+OPTIONAL = {'objects/detections', '/tf', '/planning_scene', '/joint_states',
+            'views/<camera>/count'}
 
 
 def section(text, node):

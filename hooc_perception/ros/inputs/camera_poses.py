@@ -37,23 +37,27 @@ class TfPoses:
     def __init__(self, node: StageNode[Any, Any]) -> None:
         """Listen for a StageNode until it is cleaned up."""
         self._buffer: Any = None
-        self._asked: dict[str, int] = {}    # source frame -> last stamp in ns
+        # (source frame, who asks) -> last stamp in ns.
+        self._asked: dict[tuple[str, str], int] = {}
         if Buffer is not None and TransformListener is not None:
             self._buffer = Buffer()
             node.owned(TransformListener.unregister, TransformListener(self._buffer, node))
 
-    def lookup(self, target: str, source: str, stamp: Stamp) -> TransformStamped | None:
+    def lookup(self, target: str, source: str, stamp: Stamp,
+               asker: str = '') -> TransformStamped | None:
         """
         Return the TransformStamped T_target_source at a stamp, or None if none is known.
 
         A static pose holds at every stamp; a camera on an arm was elsewhere a moment ago.
 
+        :param asker: whose stamps these are: time was set back if they are not in order.
         :raises PoseNotYet: if it is known at other stamps only.
         """
         if self._buffer is None or not source:
             return None
         stamp_ns = nanoseconds(stamp)
-        asked, self._asked[source] = self._asked.get(source, stamp_ns), stamp_ns
+        key = source, asker
+        asked, self._asked[key] = self._asked.get(key, stamp_ns), stamp_ns
         try:
             return self._buffer.lookup_transform(target, source, Time.from_msg(stamp))
         except ExtrapolationException:
@@ -91,7 +95,7 @@ class PoseParameters:
             self._node.declare_parameter(key, [], ParameterDescriptor(
                 dynamic_typing=True, description=f'Pose of the optical frame of {name} in the '
                 'target frame: x y z qx qy qz qw; empty takes topics or tf. [m]'))
-        _pose(key, self._node.get_parameter(key).value)
+        pose_numbers(key, self._node.get_parameter(key).value)
 
     def __getitem__(self, name: str) -> tuple[float, ...]:
         """Return the pose of a camera as it is now, () for none."""
@@ -103,13 +107,13 @@ class PoseParameters:
             if parameter.name.startswith('extrinsics.') and (
                     self._node.has_parameter(parameter.name)):
                 try:
-                    _pose(parameter.name, parameter.value)
+                    pose_numbers(parameter.name, parameter.value)
                 except HoocError as error:
                     return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
 
-def _pose(key: str, value: Any) -> tuple[float, ...]:
+def pose_numbers(key: str, value: Any) -> tuple[float, ...]:
     """Return the value of a parameter as a tuple of 0 or 7 floats; HoocError for no pose."""
     try:
         pose = tuple(float(x) for x in value)

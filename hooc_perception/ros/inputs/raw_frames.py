@@ -8,7 +8,7 @@ import textwrap
 from typing import Any, TypeVar
 
 from geometry_msgs.msg import TransformStamped
-from hooc_perception.core.arrays import Float32Array, UInt8Array
+from hooc_perception.core.arrays import BoolArray, Float32Array, UInt8Array
 from hooc_perception.core.segment.checks import (
     pose_trouble,
     reading_trouble,
@@ -19,7 +19,12 @@ from hooc_perception.core.segment.fusion import Fusion
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.depth_units import depth_unit_error
-from hooc_perception.ros.messages.conversions import camera_from_messages, depth_from_message
+from hooc_perception.ros.messages.conversions import (
+    camera_from_messages,
+    depth_from_message,
+    nanoseconds,
+)
+import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
 
 T = TypeVar('T')
@@ -42,11 +47,15 @@ class RawFrame:
     :ivar camera: Camera.
     :ivar depth: (H, W) float32 metres, raw, NaN = none.
     :ivar frame_id: of the optical frame.
+    :ivar stamp_ns: of the image.
+    :ivar hidden: (H, W) bool, pixels where the robot hides the scene, see DepthView.
     """
 
     camera: Camera
     depth: Float32Array
     frame_id: str
+    stamp_ns: int = 0
+    hidden: BoolArray | None = None
 
 
 class RawFrames:
@@ -88,7 +97,7 @@ class RawFrames:
         if self.camera is not None and not same_calibration(camera, self.camera):
             self._fusion.forget()
         self.camera = camera
-        return RawFrame(camera, depth, image.header.frame_id)
+        return RawFrame(camera, depth, image.header.frame_id, nanoseconds(image.header.stamp))
 
     def remember(self, depth: Float32Array, frames: int) -> None:
         """
@@ -112,9 +121,11 @@ class RawFrames:
         :return: (view; (H, W) number of readings per pixel, None if nothing was fused).
         """
         if len(self._fusion) < 2:
-            return DepthView(frame.camera, frame.depth), None
+            return DepthView(frame.camera, frame.depth, frame.hidden), None
         depth, count = self._fusion.fused()
-        return DepthView(frame.camera, depth), count
+        # Earlier images may have seen what the robot hides now.
+        hidden = None if frame.hidden is None else frame.hidden & np.isnan(depth)
+        return DepthView(frame.camera, depth, hidden), count
 
     def _camera(self, info: CameraInfo, transform: TransformStamped) -> Camera:
         """Return the Camera of two messages; the same object while they say the same."""

@@ -15,16 +15,17 @@ from hooc_perception.diagnosis.streams import (
     read_streams,
 )
 from hooc_perception.errors import HoocError
-from hooc_perception.io.bags.camera_topics import camera_from_info, depth_topics
+from hooc_perception.io.bags.camera_topics import bag_camera, depth_topics
 from hooc_perception.io.bags.files import topics
+from hooc_perception.io.bags.notes import read_notes
 from hooc_perception.io.bags.salvage import salvage_bag
 
 
 def check_bag(path: Path) -> Iterator[Finding]:
     """Yield a Finding for each check of a bag (a rosbag2 folder, an .mcap or .db3 file)."""
     try:
-        known = topics(path)
-        firsts, infos, streams = read_streams(path, known)
+        known, notes = topics(path), read_notes(path)
+        firsts, infos, streams = read_streams(path, known, notes.depth_unit)
     except HoocError as error:
         yield Finding(ERROR, 'bag', str(error))
         yield from check_remains(path)
@@ -32,7 +33,7 @@ def check_bag(path: Path) -> Iterator[Finding]:
     yield Finding(OK, 'bag', f'{sum(t.count for t in known.values())} messages on '
                   f'{len(known)} topics')
     try:
-        cameras = depth_topics(firsts, path)
+        cameras = depth_topics(firsts, infos, path)
     except HoocError as error:
         yield Finding(ERROR, 'cameras', str(error))
         return
@@ -42,7 +43,7 @@ def check_bag(path: Path) -> Iterator[Finding]:
             sound &= finding.level != ERROR
             yield Finding(finding.level, name, finding.text)
         try:
-            camera_from_info(name, topic, infos, firsts[topic], path)
+            bag_camera(name, topic, infos, firsts[topic], path, notes.rectified.of(name))
         except HoocError as error:
             sound = False
             yield Finding(ERROR, name, str(error))

@@ -8,19 +8,23 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING
 from hooc_perception.errors import HoocError
+from hooc_perception.io.bags.camera_topics import camera_of_topic
 from hooc_perception.io.bags.files import BagTopic, iter_messages
-from hooc_perception.io.depth_encodings import decode_depth
-from hooc_perception.io.depth_units import NEAREST_M
+from hooc_perception.io.bags.images import may_hold_depth, read_image
+from hooc_perception.io.bags.notes import PerCamera
+from hooc_perception.io.depth_encodings import decode_depth, DEPTH_ENCODINGS
+from hooc_perception.io.depth_units import depth_unit_error
 import numpy as np
 
 IMAGE, INFO = 'sensor_msgs/msg/Image', 'sensor_msgs/msg/CameraInfo'
 # The defaults of the ingestion node: max_set_spread_s and max_frame_age_s.
 MAX_SPREAD_S, MAX_LAG_S = 0.1, 1.0
 FEW_READINGS = 0.2
-# Beyond the range of any depth camera; a larger median means another unit.
-FARTHEST_M = 30.0
+# Stamps below this (1973) are not of a computer's clock: simulators and some sensors begin at 0.
+EPOCH_S = 1e8
 
 
 @dataclass
@@ -32,8 +36,8 @@ class DepthStream:
     :ivar sizes: (width, height) of the images.
     :ivar stamps: header stamps, s.
     :ivar readings: share of pixels with a reading, per image.
-    :ivar medians: median depth, m, per image with readings.
     :ivar damage: one sentence per unreadable image.
+    :ivar units: one sentence per image that seems to be in another unit.
     :ivar lags: recording time minus header stamp, s.
     """
 
@@ -42,15 +46,16 @@ class DepthStream:
     encodings: set[str] = field(default_factory=set)
     stamps: list[float] = field(default_factory=list)
     readings: list[float] = field(default_factory=list)
-    medians: list[float] = field(default_factory=list)
     damage: list[str] = field(default_factory=list)
+    units: list[str] = field(default_factory=list)
     lags: list[float] = field(default_factory=list)
 
-    def add(self, image: Any, time_ns: int) -> None:
+    def add(self, image: Any, time_ns: int, unit: float | None = None) -> None:
         """
         Include one Image message.
 
         :param time_ns: when it was recorded.
+        :param unit: metres per count, None = as its encoding says.
         """
         self.sizes.add((image.width, image.height))
         self.encodings.add(image.encoding)
@@ -58,28 +63,31 @@ class DepthStream:
         self.lags.append(time_ns * 1e-9 - self.stamps[-1])
         try:
             depth = decode_depth(image.data, image.height, image.width, image.encoding,
-                                 image.step, image.is_bigendian)
+                                 image.step, image.is_bigendian, unit)
         except HoocError as error:
             self.damage.append(str(error))
             return
         seen = np.isfinite(depth)
         self.readings.append(float(seen.mean()))
-        if seen.any():
-            self.medians.append(float(np.median(depth[seen])))
+        if trouble := depth_unit_error(depth, image.encoding, ObserveConfig().max_depth_m):
+            self.units.append(trouble)
 
 
-def read_streams(path: Path, known: Mapping[str, BagTopic]) -> tuple[
+def read_streams(path: Path, known: Mapping[str, BagTopic],
+                 units: PerCamera[float] = PerCamera()) -> tuple[
         dict[str, Any], dict[str, Any], dict[str, DepthStream]]:
     """
     Read every depth image once.
 
     :param known: {topic: BagTopic}.
+    :param units: metres per count, where the user states them.
     :return: ({topic: first Image}, {topic: first CameraInfo}, {topic: DepthStream}).
     """
     firsts: dict[str, Any] = {}
     infos: dict[str, Any] = {}
     streams: defaultdict[str, DepthStream] = defaultdict(DepthStream)
-    wanted = {name for name, topic in known.items() if topic.type_name in (IMAGE, INFO)}
+    wanted = {name for name, topic in known.items()
+              if topic.type_name == INFO or may_hold_depth(topic)}
     for message in iter_messages(path, wanted):
         name = message.topic.name
         if message.topic.type_name == INFO:
@@ -89,13 +97,13 @@ def read_streams(path: Path, known: Mapping[str, BagTopic]) -> tuple[
         stream = streams[name]
         stream.count += 1
         try:
-            image: Any = message.read(path)
+            image: Any = read_image(message, path)
         except HoocError as error:
             stream.damage.append(str(error))
             continue
         firsts.setdefault(name, image)
-        if 'depth' in name.lower() or image.encoding in ('16UC1', '32FC1', 'mono16'):
-            stream.add(image, message.time_ns)
+        if 'depth' in name.lower() or image.encoding in DEPTH_ENCODINGS:
+            stream.add(image, message.time_ns, units.of(camera_of_topic(name)))
     return firsts, infos, streams
 
 
@@ -137,18 +145,8 @@ def _check_readings(topic: str, stream: DepthStream) -> Iterator[Finding]:
 
 def _check_unit(topic: str, stream: DepthStream) -> Iterator[Finding]:
     """Yield whether the depth seems to be in another unit than its encoding says."""
-    if not stream.medians:
-        return
-    median_m = np.median(stream.medians)
-    if median_m > FARTHEST_M:
-        unit = 'millimetres as 32FC1' if '32FC1' in stream.encodings else 'a finer unit as 16UC1'
-        yield Finding(ERROR, topic, f'{topic} measures distances of {median_m:.0f} m, so it seems '
-                      f'to hold {unit}; publish 16UC1 in millimetres or 32FC1 in metres')
-    if median_m < NEAREST_M:
-        encodings = ', '.join(sorted(stream.encodings))
-        yield Finding(ERROR, topic, f'{topic} measures distances of {1000 * median_m:.2g} mm, so '
-                      f'{encodings} seems to hold metres or centimetres; publish 16UC1 in '
-                      'millimetres or 32FC1 in metres')
+    if stream.units:
+        yield Finding(ERROR, topic, f'{topic}: {stream.units[0]}')
 
 
 def _check_stamps(topic: str, stream: DepthStream) -> Iterator[Finding]:
@@ -163,6 +161,11 @@ def _check_stamps(topic: str, stream: DepthStream) -> Iterator[Finding]:
     elif np.any(np.diff(stamps) == 0):
         yield Finding(WARNING, topic, f'two images of {topic} have the same stamp; '
                       'fix the driver')
+    if stamps and 0 < max(stamps) < EPOCH_S and np.median(stream.lags) > EPOCH_S:
+        yield Finding(WARNING, topic, f'the stamps of {topic} begin at {min(stamps):.4g} s, as '
+                      'those of a simulator do, so live nodes need use_sim_time:=true and /clock '
+                      '("ros2 bag play --clock"); hooc replay and hooc run stamp anew')
+        return
     lag = float(np.median(stream.lags)) if stream.lags else 0.0
     if abs(lag) > MAX_LAG_S and any(stamps):
         yield Finding(WARNING, topic, f'the stamps of {topic} lie {abs(lag):.3g} s '

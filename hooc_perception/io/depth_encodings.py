@@ -46,7 +46,7 @@ def counts_from_depth(depth: npt.ArrayLike, unit: float = 0.001) -> UInt16Array:
 
 
 def decode_depth(data: Buffer, height: int, width: int, encoding: str, step: int = 0,
-                 is_bigendian: bool | int = False) -> Float32Array:
+                 is_bigendian: bool | int = False, unit: float | None = None) -> Float32Array:
     """
     Return the (height, width) float32 depth in metres, NaN = none, of an image message's data.
 
@@ -55,12 +55,16 @@ def decode_depth(data: Buffer, height: int, width: int, encoding: str, step: int
         infinite and non-positive values = none).
     :param step: bytes per row, 0 = packed rows.
     :param is_bigendian: byte order of `data`.
+    :param unit: metres per count or per unit of the floating point number; None = as the
+        encoding says.
     :raises HoocError: for another encoding or a buffer that is too short for the image.
     """
     counts_or_metres = decode_image(data, height, width, _dtype(encoding), step, is_bigendian)
     if encoding != METRES:
-        return depth_from_counts(counts_or_metres)
+        return depth_from_counts(counts_or_metres, unit or 0.001)
     depth = counts_or_metres.astype(np.float32)
+    if unit is not None:
+        depth *= np.float32(unit)
     with np.errstate(invalid='ignore'):
         depth[~(np.isfinite(depth) & (depth > 0))] = np.nan
     return depth

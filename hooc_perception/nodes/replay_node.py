@@ -15,13 +15,23 @@ from hooc_perception.core.config import param
 from hooc_perception.core.geometry import pose_from_matrix
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
-from hooc_perception.io.bags.reader import BagScene, iter_messages
+from hooc_perception.io.bags.bag_format import IMAGE
+from hooc_perception.io.bags.images import read_image
+from hooc_perception.io.bags.reader import BagMessage, BagScene, iter_messages
+from hooc_perception.io.depth_encodings import (
+    counts_from_depth,
+    decode_depth,
+    METRES,
+    MILLIMETRES,
+)
 from hooc_perception.ros.lifecycle.spin import run_node
 from hooc_perception.ros.lifecycle.stage_config import NodeConfig
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import (
     camera_info_message,
+    depth_message,
     header,
+    image_message,
     nanoseconds,
     time_message,
     transform_message,
@@ -38,7 +48,7 @@ from std_msgs.msg import Header, String
 class ReplayConfig(PlayerConfig, NodeConfig):
     """Parameters of the replay node."""
 
-    bag: str = param('', 'The rosbag2 folder, or its .mcap or .db3 file.')
+    bag: str = param('', 'The rosbag2 folder, or an .mcap, .db3 or (ROS 1) .bag file.')
     wait_for_subscribers: int = param(1, 'Start when every image topic has this many '
                                       'subscribers.', '', 0, 100)
     match_timeout_s: float = param(30.0, 'Give up waiting for subscribers after this time.',
@@ -203,12 +213,31 @@ class Replay:
         bag = self._node.config.bag
         cameras = {topic: name for name, topic in self._bag.depth_topics.items()}
         for message in iter_messages(bag, set(cameras)):
+            camera = cameras[message.topic.name]
+            image = self._image(message, self._bag.depth_unit(camera))
+            yield camera, nanoseconds(image.header.stamp), image
+
+    def _image(self, message: BagMessage, unit: float | None) -> Image:
+        """
+        Return a recorded image as it is, uncompressed; in metres if the user states its unit.
+
+        :raises HoocError: if it is damaged.
+        """
+        bag = self._node.config.bag
+        if message.topic.type_name == IMAGE and unit is None:
             try:
-                image = deserialize_message(message.data, Image)
+                return deserialize_message(message.data, Image)
             except Exception:   # the bytes may be anything
                 raise HoocError(f'{bag}: a message of {message.topic.name} is damaged; record or '
                                 'copy the bag again') from None
-            yield cameras[message.topic.name], nanoseconds(image.header.stamp), image
+        image = read_image(message, bag)
+        head = header(image.header.stamp.sec * 10 ** 9 + image.header.stamp.nanosec,
+                      image.header.frame_id)
+        depth = decode_depth(image.data, image.height, image.width, image.encoding, image.step,
+                             image.is_bigendian, unit)
+        if image.encoding == METRES or unit is not None:
+            return depth_message(depth, head)
+        return image_message(counts_from_depth(depth), MILLIMETRES, head)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -165,7 +165,7 @@ def metres_as_millimetres(image, i):
     (image_edit(nearly_blind), WARNING, ['camera1', 'of its pixels']),
     (image_edit(cut), ERROR, ['camera1', '1 of 3 images', 'needs']),
     (image_edit(colour), ERROR, ['camera1', "'rgb8'", '16UC1']),
-    (image_edit(metres_as_millimetres), ERROR, ['camera1', 'millimetres as 32FC1']),
+    (image_edit(metres_as_millimetres), ERROR, ['camera1', '32FC1 seems to hold millimetres']),
 ])
 def test_faults_of_one_camera(sound, tmp_path, edit, level, words):
     text = found(rewritten(sound, tmp_path / 'bag', edit), level)

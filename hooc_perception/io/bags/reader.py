@@ -15,24 +15,26 @@ from pathlib import Path
 from typing import Any
 
 from hooc_perception.core.arrays import Float64Array, UInt8Array
+from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.camera_topics import (
-    camera_from_info,
+    all_depth_topics,
+    bag_camera,
     cameras_without_depth,
     depth_topics,
 )
-from hooc_perception.io.bags.contents import read_contents
+from hooc_perception.io.bags.contents import beside, image_frames, read_contents, TABLE_FRAME
 from hooc_perception.io.bags.files import BagMessage, BagTopic, iter_messages, oddities, topics
 from hooc_perception.io.bags.frames import FrameTree, plain
+from hooc_perception.io.bags.images import read_image
 from hooc_perception.io.depth_encodings import decode_depth, decode_image
+from hooc_perception.io.depth_units import depth_unit_error
 from hooc_perception.io.scenes.scene import TrueObject
 from hooc_perception.io.scenes.table_frame import TableFrameScene
 import numpy as np
 
 __all__ = ['BagMessage', 'BagScene', 'BagTopic', 'iter_messages', 'topics']
-
-TABLE_FRAME = 'table'
 
 
 class BagScene(TableFrameScene):
@@ -62,13 +64,16 @@ class BagScene(TableFrameScene):
         self.topics: dict[str, BagTopic] = contents.topics
         self.info: dict[str, Any] = contents.info
         self.name: str = self.info['scene']
-        self.depth_topics: dict[str, str] = _in_camera_order(
-            depth_topics(contents.first_images, self.path), self.info['cameras'])
+        self._notes = contents.notes
+        self.depth_topics: dict[str, str] = _in_camera_order(depth_topics(
+            contents.first_images, contents.camera_infos, self.path), self.info['cameras'])
+        self._all_topics = all_depth_topics(contents.first_images, contents.camera_infos)
         firsts = {name: contents.first_images[topic] for name, topic in self.depth_topics.items()}
         self._start_ns = max(_stamp_ns(image.header) for image in firsts.values())
-        cameras = [camera_from_info(name, topic, contents.camera_infos, firsts[name], self.path)
+        cameras = [bag_camera(name, topic, contents.camera_infos, firsts[name], self.path,
+                              self._notes.rectified.of(name))
                    for name, topic in self.depth_topics.items()]
-        frames = {name: image.header.frame_id for name, image in firsts.items()}
+        frames = image_frames(self.depth_topics, contents, self.path)
         wanted = self._wanted_world(contents.tree, world_frame)
         self.table_known: bool = wanted is not None
         world = plain(wanted or contents.tree.root(next(iter(frames.values()))))
@@ -87,6 +92,9 @@ class BagScene(TableFrameScene):
                 f'{self.path}: there is no depth image of {", ".join(names)}, though the bag '
                 f'names it as a camera, so only {", ".join(self.depth_topics)} will be used; '
                 'record its depth topic, too')
+        sentences += [
+            f'{self.path}: camera {name} has several depth topics; {topics[0]} is used, not '
+            f'{", ".join(topics[1:])}' for name, topics in self._all_topics.items() if topics[1:]]
         return tuple(sentences)
 
     @property
@@ -122,7 +130,8 @@ class BagScene(TableFrameScene):
 
     def labels(self) -> dict[str, UInt8Array] | None:
         """Return {camera: (H, W) uint8 instance labels}, None if the bag holds none."""
-        wanted = {self._sibling(name, 'instance_labels'): name for name in self.depth_topics}
+        wanted = {beside(topic, 'instance_labels'): name
+                  for name, topic in self.depth_topics.items()}
         result = {}
         for message in iter_messages(self.path, set(wanted)):
             image = message.read(self.path)
@@ -144,7 +153,7 @@ class BagScene(TableFrameScene):
             topic = message.topic.name
             if topic in passed:
                 continue
-            image = message.read(self.path)
+            image = read_image(message, self.path)
             away = abs(_stamp_ns(image.header) - start)
             if topic not in nearest or away < nearest[topic][0]:
                 nearest[topic] = away, image
@@ -166,7 +175,8 @@ class BagScene(TableFrameScene):
             if left[topic] >= 0 or topic in views:
                 continue
             try:
-                views[topic] = self._view(cameras[topic], topic, message.read(self.path))
+                views[topic] = self._view(cameras[topic], topic,
+                                          read_image(message, self.path))
             except HoocError:
                 continue        # ingestion has dropped it, too
             if len(views) == len(cameras):
@@ -178,25 +188,27 @@ class BagScene(TableFrameScene):
         """Return the DepthView of an image message."""
         try:
             depth = decode_depth(image.data, image.height, image.width, image.encoding,
-                                 image.step, image.is_bigendian)
+                                 image.step, image.is_bigendian, self.depth_unit(camera.name))
         except HoocError as error:
             raise HoocError(f'{self.path}: {topic}: {error}') from None
         if depth.shape != (camera.height, camera.width):
             raise HoocError(f'{self.path}: {topic} has {image.width} x {image.height} pixels, '
-                            f'but its camera_info says width {camera.width} and height '
-                            f'{camera.height}; correct the driver')
+                            f'but its first image has {camera.width} x {camera.height}; record '
+                            'one resolution')
         if not np.isfinite(depth).any():
             raise HoocError(f'{self.path}: {topic} holds no reading in its first image; '
                             'record it again')
+        if trouble := depth_unit_error(depth, image.encoding, ObserveConfig().max_depth_m):
+            raise HoocError(f'{self.path}: {topic}: {trouble}')
         return DepthView(camera, depth)
 
-    def _sibling(self, camera_name: str, name: str) -> str:
-        """Return the topic `name` of a camera: beside the folder of its depth image."""
-        return f'{self.depth_topics[camera_name].rsplit("/", 2)[0]}/{name}'
+    def depth_unit(self, camera_name: str) -> float | None:
+        """Return the metres per count that the user states of a camera, None if nothing is."""
+        return self._notes.depth_unit.of(camera_name)
 
     def _wanted_world(self, tree: FrameTree, world_frame: str | None) -> str | None:
         """Return the name of the frame that is a table's, None if none is known to be."""
-        wanted = world_frame or self.info['world_frame']
+        wanted = world_frame or self._notes.world_frame or self.info['world_frame']
         if wanted and plain(wanted) not in tree:
             raise HoocError(f'{self.path}: no transform names the world frame {wanted!r}; '
                             'record /tf_static or name another frame')
@@ -208,9 +220,15 @@ class BagScene(TableFrameScene):
         """Return T_world_camera (4, 4) of the camera whose images are in `frame`."""
         T_world_camera = tree.transform(world, frame)
         if T_world_camera is None:
+            for top in (tree.root(frame), tree.root(world)):
+                if top in tree.moving:
+                    raise HoocError(
+                        f'{self.path}: camera {camera_name} (frame {frame!r}) is connected with '
+                        f'{world!r} only by {top!r}, which moves in {tree.moving[top]!r} on /tf; '
+                        'only cameras that stand still are used')
             raise HoocError(f'{self.path}: nothing connects camera {camera_name} (frame '
                             f'{frame!r}) with {world!r}; record /tf_static or '
-                            f'{self._sibling(camera_name, "extrinsics")} too')
+                            f'{beside(self.depth_topics[camera_name], "extrinsics")} too')
         return T_world_camera
 
 

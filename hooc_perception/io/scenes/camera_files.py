@@ -9,6 +9,7 @@ from typing import Any
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
 from hooc_perception.core.segment.checks import skew_trouble
+from hooc_perception.core.segment.lens_checks import distortion_trouble, scale_trouble
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import fields, files
@@ -84,6 +85,8 @@ def intrinsics(value: object, width: int, height: int, where: str) -> Float64Arr
     if not (-width < K[0, 2] < 2 * width and -height < K[1, 2] < 2 * height):
         raise HoocError(f'{where} has its centre ({K[0, 2]:g}, {K[1, 2]:g}) far outside the '
                         f'{width} x {height} image; give pixels, row by row')
+    if trouble := scale_trouble(K, width, height):
+        raise HoocError(f'{where} has {trouble}')
     return K
 
 
@@ -112,7 +115,10 @@ def _camera(name: str, entry: object, where: str) -> Camera:
                             f'{where} world_from_camera:')
     fields.closed(placed, ('translation', 'rotation_xyzw'), f'{where} world_from_camera:')
     translation, quaternion = pose(placed, f'{where} world_from_camera:')
-    return Camera(name, width, height,
-                  intrinsics(fields.required(entry, 'K', where), width, height, f'{where} K'),
-                  distortion(entry.get('D', []), model, where),
-                  matrix_from_pose(translation, quaternion), model)
+    camera = Camera(name, width, height,
+                    intrinsics(fields.required(entry, 'K', where), width, height, f'{where} K'),
+                    distortion(entry.get('D', []), model, where),
+                    matrix_from_pose(translation, quaternion), model)
+    if trouble := distortion_trouble(camera):
+        raise HoocError(f'{where} has {trouble}')
+    return camera

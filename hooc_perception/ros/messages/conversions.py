@@ -10,21 +10,19 @@ single-process run.
 
 from array import array
 from collections.abc import Iterable
+from dataclasses import replace
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose, PoseArray, TransformStamped
 from hooc_perception.core.arrays import AnyArray, Float32Array, Float64Array, UInt8Array
 from hooc_perception.core.geometry import canonical_pose, matrix_from_pose
-from hooc_perception.core.segment.checks import skew_trouble
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
+from hooc_perception.io.camera_info import camera_from_info
 from hooc_perception.io.depth_encodings import decode_depth, decode_image, METRES
 import numpy as np
 from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Header
-
-# Number of coefficients that undistortion uses; any further ones must be zero.
-_COEFFICIENTS = {'plumb_bob': 5, 'rational_polynomial': 8}
 
 
 def nanoseconds(stamp: Time) -> int:
@@ -116,38 +114,24 @@ def pose_of_transform(message: TransformStamped) -> tuple[Float64Array, Float64A
     return np.array([t.x, t.y, t.z]), np.array([q.x, q.y, q.z, q.w])
 
 
-def camera_from_messages(name: str, info: CameraInfo, transform: TransformStamped) -> Camera:
+def camera_from_messages(name: str, info: CameraInfo, transform: TransformStamped,
+                         size: tuple[int, int] | None = None,
+                         rectified: bool = False) -> Camera:
     """
     Return the Camera that a CameraInfo and its extrinsics describe.
 
     :param transform: T_world_camera, camera optical frame to world.
+    :param size: (width, height) of the images; None takes that of the calibration.
+    :param rectified: the images are rectified already.
     :raises HoocError: if the calibration is unusable; names the camera and the field.
     """
-    K, D = np.array(info.k, np.float64).reshape(3, 3), np.array(info.d, np.float64)
-    if not (np.isfinite(K).all() and K[0, 0] > 0 and K[1, 1] > 0 and K[2, 2] == 1):
-        raise HoocError(f'camera_info of {name} holds no calibration (K = {info.k.tolist()}); '
-                        'calibrate the camera, or give its driver the calibration file')
-    if trouble := skew_trouble(K):
-        raise HoocError(f'camera_info of {name} has {trouble}')
-    if info.width == 0 or info.height == 0:
-        raise HoocError(f'camera_info of {name} says {info.width} x {info.height} pixels; the '
-                        'driver must fill in width and height')
-    model = info.distortion_model or 'plumb_bob'
-    if model not in _COEFFICIENTS:
-        raise HoocError(f'camera_info of {name} uses distortion model {model!r}; calibrate with '
-                        'plumb_bob or rational_polynomial')
-    if not np.isfinite(D).all() or np.any(D[_COEFFICIENTS[model]:] != 0):
-        raise HoocError(f'camera_info of {name} has distortion coefficients D = {D.tolist()}; '
-                        f'{model} takes {_COEFFICIENTS[model]} finite numbers')
+    camera = camera_from_info(name, info, size, rectified, f'camera_info of {name}')
     translation, rotation = pose_of_transform(transform)
     if not is_rigid(translation, rotation):
         raise HoocError(f'the extrinsics of {name} are not a rigid transform (translation '
                         f'{translation.tolist()}, rotation {rotation.tolist()}); the quaternion '
                         'must have norm 1')
-    if len(D) == 0:
-        D = np.zeros(_COEFFICIENTS[model])
-    return Camera(name, info.width, info.height, K, D,
-                  canonical_pose(matrix_from_pose(translation, rotation)), model)
+    return replace(camera, T_world_camera=canonical_pose(matrix_from_pose(translation, rotation)))
 
 
 def is_rigid(translation: Float64Array, rotation_xyzw: Float64Array) -> bool:

@@ -182,7 +182,7 @@ ERRORS = {
     'no image': (GOOD[:2], ('no depth topic',)),
     'no camera_info': ([GOOD[0], GOOD[2]], (CALIBRATION, 'missing')),
     'singular K': ([GOOD[0], (CALIBRATION, INFO, info(k=np.zeros((3, 3)))), GOOD[2]],
-                   (CALIBRATION, 'K', 'singular')),
+                   (CALIBRATION, 'K', 'no calibration')),
     'fisheye': ([GOOD[0], (CALIBRATION, INFO, info(d=[.1] * 4, model='equidistant')), GOOD[2]],
                 (CALIBRATION, 'equidistant')),
     'other size': ([GOOD[0], (CALIBRATION, INFO, info(width=640)), GOOD[2]],

@@ -9,3 +9,7 @@ class HoocError(Exception):
 
     The command line prints the message alone and exits with status 1; nodes log it.
     """
+
+
+class HoocWarning(UserWarning):
+    """Input that works but is probably not meant; the command line prints the sentence alone."""

@@ -21,7 +21,7 @@ from hooc_perception.core.parsing.uncertainty import pose_uncertainty
 from hooc_perception.core.parsing.verifier import Verifier
 from hooc_perception.core.profiles import Profile, with_overrides
 from hooc_perception.core.profiles import profile as profile_of
-from hooc_perception.core.segment.observe import observe
+from hooc_perception.core.segment.observe import observe, require_table
 from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.segment.table import table_pose
 from hooc_perception.core.symmetry import canonical_objects
@@ -118,11 +118,15 @@ class Parser:
                         observation.in_target_frame(), self.models)
 
     def observe(self, views: Sequence[DepthView | RectifiedView]) -> Observation:
-        """Stage 1: rectify the views, level them on the support plane, find the foreground."""
+        """
+        Stage 1: rectify the views, level them on the support plane, find the foreground.
+
+        :raises HoocError: where no view holds a reading or none shows the table at z = 0.
+        """
         config = self.profile.observe
         rectified = [rectify(view, config) if isinstance(view, DepthView) else view
                      for view in views]
-        return observe(rectified, config, table_pose(rectified, config))
+        return require_table(observe(rectified, config, table_pose(rectified, config)))
 
     def classify(self, observation: Observation) -> PixelProbabilities:
         """Stage 2: class probabilities of the foreground pixels."""

@@ -83,10 +83,16 @@ class Scene:
         """Return False where a deadline ended the search."""
         return self.parsed.converged
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Return one sentence per camera that does not see the table where it should be."""
+        return self.observation.troubles
+
     def to_dict(self) -> dict[str, Any]:
         """Return plain numbers and lists, as a scene of a results file (docs/scene_sets.md)."""
         from hooc_perception.io.scenes.results import parsed_entry
-        return parsed_entry(self.parsed, [model.name for model in self.models])
+        entry = parsed_entry(self.parsed, [model.name for model in self.models])
+        return {**entry, 'warnings': list(self.warnings)} if self.warnings else entry
 
     def meshes(self) -> list[tuple[Float64Array, Int32Array]]:
         """Return (vertices (V, 3) world, metres; faces (F, 3)) of each object, in place."""

@@ -14,9 +14,11 @@ import importlib
 from importlib.util import find_spec
 import os
 import sys
+from typing import TextIO
+import warnings
 
 from hooc_perception.cli import options
-from hooc_perception.errors import HoocError
+from hooc_perception.errors import HoocError, HoocWarning
 from hooc_perception.extras import advice
 
 # One line each, kept here so that the overview imports none of the commands.
@@ -122,6 +124,14 @@ def dispatch(argv: Sequence[str]) -> int:
     return code
 
 
+def show_warning(message: Warning | str, category: type[Warning], filename: str, lineno: int,
+                 file: TextIO | None = None, line: str | None = None) -> None:
+    """Print our own warnings as one sentence, those of libraries as Python does."""
+    text = (f'[WARN] {message}\n' if issubclass(category, HoocWarning) else
+            warnings.formatwarning(message, category, filename, lineno, line))
+    (file or sys.stderr).write(text)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """
     Run the command line and return the exit code.
@@ -131,7 +141,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     argv = sys.argv[1:] if argv is None else list(argv)
     try:
-        return dispatch(argv)
+        with warnings.catch_warnings():
+            warnings.showwarning = show_warning
+            return dispatch(argv)
     except KeyboardInterrupt:
         print('hooc: interrupted', file=sys.stderr)
         return 130

@@ -6,6 +6,7 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Sequence
 from itertools import repeat
 from pathlib import Path
+import sys
 import time
 from typing import Any, TYPE_CHECKING
 
@@ -74,6 +75,8 @@ def run(args: Namespace) -> int | None:
             if isinstance(parsed, HoocError):
                 failures[scene.name] = parsed
                 continue
+            for warning in parsed.get('warnings', ()):
+                progress.write(f'[WARN] scene {scene.name}: {warning}', file=sys.stderr)
             results.append(scene_entry(scene.name, parsed, seconds, profile=parser.profile.name,
                                        seed=seed, setting=setting, **scene.world, **of_scene))
         progress.close()

@@ -107,11 +107,13 @@ class Observation:
     :ivar noise_m: standard deviation of the measured heights of the table top.
     :ivar T_target_table: (4, 4) float64 from the table frame, in which the views are posed and
         the stages work, to the target frame of results; None = the same frame.
+    :ivar troubles: one sentence per camera that does not see the table where it should be.
     """
 
     views: tuple[ObservedView, ...]
     noise_m: float
     T_target_table: Float64Array | None = None
+    troubles: tuple[str, ...] = ()
 
     def in_target_frame(self) -> 'Observation':
         """Return the same with its views posed in the target frame."""
@@ -120,7 +122,7 @@ class Observation:
         return Observation(tuple(
             replace(view, camera=replace(view.camera, T_world_camera=self.T_target_table
                                          @ view.camera.T_world_camera))
-            for view in self.views), self.noise_m)
+            for view in self.views), self.noise_m, troubles=self.troubles)
 
 
 @dataclass(frozen=True)

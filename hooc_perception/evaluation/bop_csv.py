@@ -30,7 +30,7 @@ def write_bop_csv(path: str | Path, results: dict[str, Any], scene_set: SceneSet
     """
     rows = ['scene_id,im_id,obj_id,score,R,t,time']
     numbers = _object_ids(scene_set)
-    centres = {c.name: mesh_box(c.mesh_path, c.scale)[0] for c in scene_set.categories}
+    centres = {c.name: mesh_box(c.mesh_path, c.scale, c.up)[0] for c in scene_set.categories}
     entries = {entry['scene']: entry for entry in results['scenes']}
     for index, scene in enumerate(scene_set.scenes):
         entry = entries.get(scene.name)

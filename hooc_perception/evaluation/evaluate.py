@@ -72,7 +72,8 @@ def scoring_models(scene_set: SceneSet, seed: int = 0,
     out, known = {}, {model.name: model.variants for model in trained}
     for category in scene_set.categories:
         paths = category.variant_paths if category.name not in known else ()
-        model, *variants = (_scoring_model(category.name, load_mesh(path, category.scale), seed)
+        model, *variants = (_scoring_model(category.name, load_mesh(path, category.scale,
+                                                                    category.up), seed)
                             for path in (category.mesh_path, *paths))
         out[category.name] = replace(model, variants=known.get(category.name, tuple(variants)))
     return out

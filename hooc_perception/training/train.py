@@ -65,8 +65,13 @@ class TrainedCategory(Protocol):
         ...
 
     @property
-    def scale(self) -> float:
-        """Return the factor from units of the meshes to metres."""
+    def scale(self) -> float | None:
+        """Return the factor from units of the meshes to metres, None = as they document it."""
+        ...
+
+    @property
+    def up(self) -> str | None:
+        """Return the axis of the meshes that points up, None = as they document it."""
         ...
 
     @property
@@ -153,7 +158,7 @@ def generic_models(scene_set: TrainingSet, seed: int,
     for index, category in enumerate(tqdm(scene_set.categories, desc='generic models',
                                           unit='model', disable=not progress)):
         first, *variants = (
-            derive(category.name, load_mesh(path, category.scale),
+            derive(category.name, load_mesh(path, category.scale, category.up),
                    stage_rng(seed, 'derive', index, member))
             for member, path in enumerate((category.mesh_path, *category.variant_paths)))
         models.append(replace(first, variants=tuple(variants)))

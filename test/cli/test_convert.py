@@ -16,7 +16,9 @@ import trimesh
 @pytest.fixture
 def scene_set(tmp_path):
     K = np.array([[50.0, 0, 19.5], [0, 50, 14.5], [0, 0, 1]])
-    cameras = tuple(Camera(n, 40, 30, K, np.zeros(5), np.eye(4)) for n in ('left', 'right'))
+    T = np.diag([1.0, -1, -1, 1])
+    T[2, 3] = 0.8
+    cameras = tuple(Camera(n, 40, 30, K, np.zeros(5), T) for n in ('left', 'right'))
     depth = np.full((30, 40), 0.8)
     return write_scene_set(tmp_path / 'set', 'small', {'box': trimesh.creation.box((1, 1, 1))},
                            cameras, [NewScene(n, (depth, depth)) for n in ('a', 'b', 'c')])

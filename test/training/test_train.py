@@ -50,6 +50,7 @@ class MeshCategory:
     mesh_path: object
     scale: float = 1.0
     variant_paths: tuple = ()
+    up: object = None
 
 
 @pytest.fixture(scope='module')

@@ -8,18 +8,23 @@ ingestion node reports it while running, `hooc doctor` for a bag.
 """
 
 from collections.abc import Sequence, Sized
-from dataclasses import replace
 
 from hooc_perception.core.arrays import Float32Array, Float64Array
-from hooc_perception.core.geometry import back_project
+from hooc_perception.core.segment.pose_reading import (
+    LITTLE,
+    pose_reading,
+    WORKSPACE_M,
+    workspace_share,
+)
+from hooc_perception.core.segment.table_sight import depth_factor, TABLE_READINGS, table_sight
 from hooc_perception.core.types import Camera, RectifiedView
 import numpy as np
 
 FARTHEST_CAMERA_M = 10.0
+# Where most cameras stand: tells a wrong unit of the depth from one of the translation.
+NEAREST_CAMERA_M, USUAL_CAMERA_M = 0.25, 4.0
 # As a share of the focal length; more means that the numbers of the matrix are out of order.
 MAX_SKEW = 0.05
-# A table needs this many readings, counted in every STRIDE-th row and column.
-STRIDE, TABLE_READINGS = 4, 100
 
 
 def reading_trouble(depth: Float32Array) -> str | None:
@@ -33,42 +38,87 @@ def pose_trouble(camera: Camera) -> str | None:
     """Check that a camera stands above the table, near it, and looks at it."""
     T = camera.T_world_camera
     away = float(np.linalg.norm(T[:3, 3]))
-    if T[2, 3] <= 0:
-        return (f'its pose lies {-T[2, 3]:.2f} m below the table; the transform may be inverted '
-                '(wanted: camera to world, z up)')
     if away > FARTHEST_CAMERA_M:
-        return (f'it stands {away:.3g} m away from the table; extrinsics are in metres, and the '
-                'origin of the target frame is on the table')
+        return _misplaced(camera, f'it stands {away:.3g} m away from the table',
+                          'extrinsics are in metres, and the origin of the target frame is on '
+                          'the table')
+    if T[2, 3] <= 0:
+        return _misplaced(camera, f'its pose lies {-T[2, 3]:.2f} m below the table',
+                          'the transform may be inverted (wanted: camera to world, z up)')
     corners = np.array([[u, v, 1.0] for u in (0, camera.width - 1) for v in (
         0, camera.height - 1)]) @ np.linalg.inv(camera.K).T @ T[:3, :3].T
     if (corners[:, 2] >= 0).all() and T[2, 2] >= 0:
-        return ('it looks up, away from the table; check that its extrinsics belong to the '
-                'optical frame (x right, y down, z forward)')
+        return _misplaced(camera, 'it looks up, away from the table',
+                          'check that its extrinsics belong to the optical frame (x right, y '
+                          'down, z forward)')
     return None
+
+
+def aim_trouble(camera: Camera) -> str | None:
+    """
+    Check that a camera looks at the workspace, as far as its pose alone tells.
+
+    A camera that is turned elsewhere is reported where a usual mistake explains it, or where it
+    has no part of the workspace in view.
+    """
+    if trouble := pose_trouble(camera):
+        return trouble
+    share = workspace_share(camera)
+    if share > LITTLE or share > 0 and not pose_reading(camera):
+        return None
+    return _misplaced(camera, f'it has {share:.0%} of the workspace in view, {WORKSPACE_M:g} m '
+                      'around the origin of the table', 'check its extrinsics (optical frame: x '
+                      'right, y down, z forward), and that the frame lies on the table')
+
+
+def _misplaced(camera: Camera, what: str, fix: str) -> str:
+    """Return the sentence on an implausible pose, with the mistake that explains it."""
+    reading = pose_reading(camera)
+    return f'{what}, but it would be right if {reading}' if reading else f'{what}; {fix}'
 
 
 def table_trouble(view: RectifiedView, band_m: float, radius_m: float) -> str | None:
     """
-    Check that a view shows the table where its pose says.
+    Check that a view shows the table where its pose says: a level surface at z = 0.
 
     :param band_m: height around z = 0 that counts as table, metres.
     :param radius_m: horizontal distance from the origin within which to look, metres.
     """
-    K = view.camera.K.copy()
-    K[:2] /= STRIDE
-    points = back_project(view.depth[::STRIDE, ::STRIDE],
-                          replace(view.camera, K=K)).reshape(-1, 3)
-    points = points[np.isfinite(points[:, 2])]
-    near = points[np.hypot(points[:, 0], points[:, 1]) < radius_m]
-    if (np.abs(near[:, 2]) < band_m).sum() >= TABLE_READINGS:
+    sight = table_sight(view, band_m, radius_m)
+    if sight.sees_table:
         return None
-    if len(near) < TABLE_READINGS:
-        return (f'it measures nothing within {radius_m:g} m of the origin of the target frame; '
-                'check its extrinsics, and that the frame lies on the table')
-    heights = np.histogram(near[:, 2], np.arange(-2.0, 2.0, 0.02))
-    most = heights[1][heights[0].argmax()] + 0.01
-    return (f'it measures no table at z = 0 of the target frame (most readings lie at z = '
-            f'{most:.2f} m); check its extrinsics, and that z = 0 is the table top')
+    factor = depth_factor(view, radius_m)
+    if factor:
+        away = float(np.linalg.norm(view.camera.T_world_camera[:3, 3]))
+        what, times = (('depth', factor) if NEAREST_CAMERA_M < away < USUAL_CAMERA_M else
+                       ('translation', 1 / factor))
+        return (f'it would measure the table at z = 0 of the target frame if its {what} were '
+                f'{times:g} times as large; check the unit of its {what}')
+    if len(sight.near) < TABLE_READINGS:
+        trouble = (f'it measures nothing within {radius_m:g} m of the origin of the target frame; '
+                   'check its extrinsics, and that the frame lies on the table')
+    elif sight.band >= TABLE_READINGS:
+        trouble = ('what it measures at z = 0 of the target frame is not level (it is tilted by '
+                   f'{sight.tilt_deg:.0f} degrees); check its extrinsics, and that z points up')
+    else:
+        heights = np.histogram(sight.near[:, 2], np.arange(-2.0, 2.0, 0.02))
+        most = heights[1][heights[0].argmax()] + 0.01
+        trouble = (f'it measures no table at z = 0 of the target frame (most readings lie at z = '
+                   f'{most:.2f} m); check its extrinsics, and that z = 0 is the table top')
+    if workspace_share(view.camera) < LITTLE and (reading := pose_reading(view.camera)):
+        trouble += f' (its pose would be right if {reading})'
+    return trouble
+
+
+def table_troubles(views: Sequence[RectifiedView], band_m: float,
+                   radius_m: float) -> dict[str, str]:
+    """
+    Return {camera: sentence} of the views that do not show the table; see `table_trouble`.
+
+    Views without any reading, of cameras that have dropped out, are passed over.
+    """
+    return {view.camera.name: trouble for view in views if np.isfinite(view.depth).any()
+            and (trouble := table_trouble(view, band_m, radius_m))}
 
 
 def skew_trouble(K: Float64Array) -> str | None:

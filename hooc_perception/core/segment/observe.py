@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from hooc_perception.core.arrays import Float64Array
+from hooc_perception.core.segment.checks import table_troubles
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.foreground import against_table, Allowed
 from hooc_perception.core.segment.level import LEAST_SIGMA_M, level, MOST_SIGMA_M
@@ -47,6 +48,7 @@ def observe(views: Sequence[RectifiedView], config: ObserveConfig = ObserveConfi
                         'at all (every pixel is 0 or NaN), nor does any other; check the '
                         'sensors and the unit')
     views, reach_m = in_table_frame(views, T_target_table), radius_m(config)
+    troubles = table_troubles(views, config.table_band_m, reach_m)
     allowed = Allowed(workspace_of(config.workspace, config.ignore), T_target_table, reach_m)
     fits = [level(view, config, reach_m) for view in views]
     known = [sigma for _, sigma in fits if np.isfinite(sigma)]
@@ -55,4 +57,21 @@ def observe(views: Sequence[RectifiedView], config: ObserveConfig = ObserveConfi
     return Observation(
         tuple(replace(against_table(camera, view.depth, sigma if np.isfinite(sigma) else noise_m,
                                     config, allowed), hidden=view.hidden)
-              for view, (camera, sigma) in zip(views, fits)), noise_m, T_target_table)
+              for view, (camera, sigma) in zip(views, fits)), noise_m, T_target_table,
+        tuple(f'camera {name}: {trouble}' for name, trouble in troubles.items()))
+
+
+def require_table(observation: Observation) -> Observation:
+    """
+    Return an observation if some camera sees the table; nothing sensible follows from others.
+
+    :raises HoocError: one sentence on the first camera, where none sees it.
+    """
+    seeing = [view for view in observation.views if np.isfinite(view.depth).any()]
+    if seeing and len(observation.troubles) == len(seeing):
+        others = len(seeing) - 1
+        raise HoocError(f'{observation.troubles[0]}'
+                        + (f' (the other {others} cameras do not see the table either)'
+                           if others > 1 else ' (nor does the other camera see the table)'
+                           if others else ''))
+    return observation

@@ -25,6 +25,13 @@ def rectify(view: DepthView, config: ObserveConfig = ObserveConfig()) -> Rectifi
     :return: RectifiedView whose camera has neither distortion nor skew.
     :raises HoocError: if the image and its calibration disagree in size.
     """
+    rectified = undistorted(view)
+    rectified.depth[~(rectified.depth <= config.max_depth_m)] = np.nan
+    return rectified
+
+
+def undistorted(view: DepthView) -> RectifiedView:
+    """Return the RectifiedView of a raw depth image with readings at any distance."""
     camera = view.camera
     if view.depth.shape != (camera.height, camera.width):
         raise HoocError(
@@ -32,7 +39,7 @@ def rectify(view: DepthView, config: ObserveConfig = ObserveConfig()) -> Rectifi
             f'{view.depth.shape[0]} pixels, but its calibration is for {camera.width} x '
             f'{camera.height}; record both at the same resolution')
     depth = _undistorted(view.depth, camera)
-    depth[~(depth <= config.max_depth_m) | (depth <= 0)] = np.nan
+    depth[~(depth > 0)] = np.nan
     hidden = None
     if view.hidden is not None and view.hidden.any():
         hidden = rectified_numbers(view.hidden, camera) > 0

@@ -9,6 +9,7 @@ from hooc_perception.core.arrays import Float32Array, Float64Array, UInt8Array
 from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.io.scenes import png
+from hooc_perception.io.scenes.plausible import check_aim, check_unit
 from hooc_perception.io.scenes.table_frame import TableFrameScene
 
 
@@ -18,14 +19,16 @@ class Category:
     A class of objects and its meshes.
 
     :ivar mesh_path: the file of the generic mesh, of any format that trimesh reads.
-    :ivar scale: metres per unit of the meshes.
+    :ivar scale: metres per unit of the meshes, None = as their files document it, else 1.0.
     :ivar variant_paths: files of further meshes of the category, in the same axes.
+    :ivar up: axis of the files that points up, None = as they document it, else z.
     """
 
     name: str
     mesh_path: Path
-    scale: float = 1.0
+    scale: float | None = None
     variant_paths: tuple[Path, ...] = ()
+    up: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +88,15 @@ class RecordedScene(TableFrameScene):
         """
         Return one DepthView per camera: float32 metres, NaN = none, still distorted.
 
-        :raises HoocError: if an image is missing, damaged, empty or of another size.
+        :raises HoocError: if an image is missing, damaged, empty, of another size or in another
+            unit than stated, or a camera's pose cannot be meant.
         """
-        return tuple(DepthView(camera, depth)
-                     for camera, depth in zip(self.cameras, self._depth_images))
+        if self.table_known:
+            check_aim(self.cameras, self.name)
+        views = tuple(DepthView(camera, depth)
+                      for camera, depth in zip(self.cameras, self._depth_images))
+        check_unit(views, self.depth_files, self.depth_units)
+        return views
 
     def labels(self) -> dict[str, UInt8Array] | None:
         """Return {camera: (H, W) uint8 instance labels, 0 = none}, None without labels."""

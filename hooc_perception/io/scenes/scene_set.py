@@ -13,6 +13,7 @@ from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import annotations, camera_files, fields, files
 from hooc_perception.io.scenes.bop import is_bop, load_bop
 from hooc_perception.io.scenes.nominal_table import nominal_cameras
+from hooc_perception.io.scenes.plausible import check_aim
 from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
 from hooc_perception.io.scenes.truth import true_object
 from hooc_perception.io.scenes.writer import FORMAT, NewScene, write_scene_set
@@ -21,7 +22,7 @@ from hooc_perception.io.scenes.writer import FORMAT, NewScene, write_scene_set
 MAX_CATEGORIES = 255
 KEYS = ('format', 'name', 'world_frame', 'depth_unit', 'cameras', 'max_instances_per_category',
         'categories')
-CATEGORY_KEYS = ('name', 'model', 'models', 'scale')
+CATEGORY_KEYS = ('name', 'model', 'models', 'scale', 'up')
 # Meshes of one category.
 MAX_MESHES = 100
 # The world_frame of sets whose poses are not in a table's frame.
@@ -117,13 +118,17 @@ def _load_hooc(path: Path, with_scenes: bool) -> SceneSet:
                    for folder in (folders if with_scenes else ()))
     if own:
         cameras = _chosen(camera_names, set_cameras, known, file)
+        check_aim(cameras, known)
     elif with_scenes:
         cameras = scenes[0].cameras
     elif set_cameras:
         cameras = nominal_cameras(_chosen(camera_names, set_cameras, known, file))
     else:
         cameras = _scene_cameras(folders[0], camera_names, {}, path)
-        cameras = nominal_cameras(cameras) if world == UNKNOWN_WORLD else cameras
+        if world == UNKNOWN_WORLD:
+            cameras = nominal_cameras(cameras)
+        else:
+            check_aim(cameras, folders[0] / 'cameras.yaml')
     return SceneSet(path, fields.name(entry.get('name', path.resolve().name), f'{file}: name'),
                     'table' if world == UNKNOWN_WORLD else world, categories, cameras, limit,
                     scenes)
@@ -153,10 +158,14 @@ def _categories(path: Path, file: Path, entry: dict[str, Any]) -> tuple[Category
         name = fields.name(fields.required(item, 'name', f'{where}:'), f'{where} name')
         where = f'{file}: category {name}:'
         mesh, *more = _meshes(path, item, where)
-        scale = fields.number(item.get('scale', 1.0), f'{where} scale')
-        if scale <= 0:
+        scale = fields.number(item['scale'], f'{where} scale') if 'scale' in item else None
+        if scale is not None and scale <= 0:
             raise HoocError(f'{where} scale is {scale:g}; give the metres of one model unit')
-        result.append(Category(name, mesh, scale, tuple(more)))
+        up = item.get('up')
+        if up not in (None, 'x', 'y', 'z'):
+            raise HoocError(f'{where} up is {fields.short_repr(up)}; give the axis of the mesh '
+                            'that points up: x, y or z')
+        result.append(Category(name, mesh, scale, tuple(more), up))
     check_categories(fields.unique([category.name for category in result], f'{file}: categories'),
                      str(file))
     return tuple(result)

@@ -32,8 +32,9 @@ PER_CAMERA = ('depth/camera_info', 'depth/image_raw', 'extrinsics')
 def camera(name, rng, D, model='plumb_bob'):
     K = np.array([[50.0, 0, 19.5], [0, 51.0, 14.5], [0, 0, 1]])
     T_world_camera = np.eye(4)
-    T_world_camera[:3, :3] = Rotation.random(rng=rng).as_matrix()
-    T_world_camera[:3, 3] = rng.normal(size=3)
+    down = Rotation.from_euler('x', 180, degrees=True)
+    T_world_camera[:3, :3] = (down * Rotation.from_rotvec(0.1 * rng.normal(size=3))).as_matrix()
+    T_world_camera[:3, 3] = 0.1 * rng.normal(size=3) + [0, 0, 1]
     return Camera(name, WIDTH, HEIGHT, K, np.array(D), T_world_camera, model)
 
 

@@ -19,8 +19,9 @@ import yaml
 def camera(name, rng, width=40, height=30):
     K = np.array([[50.0, 0, 19.5], [0, 51.0, 14.5], [0, 0, 1]])
     T_world_camera = np.eye(4)
-    T_world_camera[:3, :3] = Rotation.random(rng=rng).as_matrix()
-    T_world_camera[:3, 3] = rng.normal(size=3)
+    down = Rotation.from_euler('x', 180, degrees=True)
+    T_world_camera[:3, :3] = (down * Rotation.from_rotvec(0.1 * rng.normal(size=3))).as_matrix()
+    T_world_camera[:3, 3] = 0.1 * rng.normal(size=3) + [0, 0, 1]
     return Camera(name, width, height, K, rng.normal(size=5) * 0.01, T_world_camera)
 
 

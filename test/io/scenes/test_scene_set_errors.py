@@ -24,7 +24,7 @@ import yaml
 def path(tmp_path):
     """Return a scene set without errors: two cameras, one scene, two categories."""
     K = np.array([[50.0, 0, 19.5], [0, 50, 14.5], [0, 0, 1]])
-    T = np.eye(4)
+    T = np.diag([1.0, -1, -1, 1])
     T[2, 3] = 1
     cameras = tuple(Camera(name, 40, 30, K, np.zeros(5), T) for name in ('left', 'right'))
     meshes = {'ball': trimesh.creation.icosphere(1, 0.04), 'box': trimesh.creation.box((1, 1, 1))}

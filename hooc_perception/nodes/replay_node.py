@@ -18,20 +18,15 @@ from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.bag_format import IMAGE
 from hooc_perception.io.bags.images import read_image
 from hooc_perception.io.bags.reader import BagMessage, BagScene, iter_messages
-from hooc_perception.io.depth_encodings import (
-    counts_from_depth,
-    decode_depth,
-    METRES,
-    MILLIMETRES,
-)
 from hooc_perception.ros.lifecycle.spin import run_node
 from hooc_perception.ros.lifecycle.stage_config import NodeConfig
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import (
     camera_info_message,
+    copied_image,
+    depth_from_message,
     depth_message,
     header,
-    image_message,
     nanoseconds,
     time_message,
     transform_message,
@@ -230,14 +225,9 @@ class Replay:
             except Exception:   # the bytes may be anything
                 raise HoocError(f'{bag}: a message of {message.topic.name} is damaged; record or '
                                 'copy the bag again') from None
-        image = read_image(message, bag)
-        head = header(image.header.stamp.sec * 10 ** 9 + image.header.stamp.nanosec,
-                      image.header.frame_id)
-        depth = decode_depth(image.data, image.height, image.width, image.encoding, image.step,
-                             image.is_bigendian, unit)
-        if image.encoding == METRES or unit is not None:
-            return depth_message(depth, head)
-        return image_message(counts_from_depth(depth), MILLIMETRES, head)
+        image = copied_image(read_image(message, bag))
+        return image if unit is None else depth_message(depth_from_message(image, unit),
+                                                        image.header)
 
 
 def main(args: Sequence[str] | None = None) -> int:

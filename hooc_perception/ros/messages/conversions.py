@@ -11,6 +11,7 @@ single-process run.
 from array import array
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Pose, PoseArray, TransformStamped
@@ -66,14 +67,25 @@ def depth_message(depth: Float32Array, head: Header) -> Image:
     return image_message(np.asarray(depth, np.dtype('<f4')), METRES, head)
 
 
-def depth_from_message(message: Image) -> Float32Array:
+def copied_image(message: Any) -> Image:
+    """Return a message with the fields of an Image, as rosbags has them, as an Image of rclpy."""
+    stamp = message.header.stamp
+    return Image(header=header(stamp.sec * 1_000_000_000 + stamp.nanosec,
+                               message.header.frame_id),
+                 height=message.height, width=message.width, encoding=message.encoding,
+                 is_bigendian=int(message.is_bigendian), step=message.step,
+                 data=message_bytes(np.asarray(message.data)))
+
+
+def depth_from_message(message: Image, unit: float | None = None) -> Float32Array:
     """
     Return (H, W) float32 metres, NaN = no reading, from a depth Image.
 
+    :param unit: metres per count; None = as the encoding says.
     :raises HoocError: if the encoding or the layout is not that of a depth image.
     """
     return decode_depth(message.data, message.height, message.width, message.encoding,
-                        message.step, bool(message.is_bigendian))
+                        message.step, bool(message.is_bigendian), unit)
 
 
 def labels_message(labels: UInt8Array, head: Header) -> Image:

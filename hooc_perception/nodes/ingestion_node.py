@@ -31,6 +31,7 @@ from hooc_perception.nodes.pace import Pace
 from hooc_perception.nodes.rig_health import RigHealth
 from hooc_perception.nodes.robot_view import RobotView
 from hooc_perception.nodes.warm_up import overhead_camera
+from hooc_perception.ros.health.playback import Playback
 from hooc_perception.ros.inputs.camera_input import CameraInput
 from hooc_perception.ros.inputs.camera_poses import PoseParameters, TfPoses
 from hooc_perception.ros.inputs.camera_topics import CameraTopics, TopicParameters
@@ -103,6 +104,7 @@ class Ingestion:
         for name in self._names:
             node.poses.declare(name)
             node.topics.declare(name)
+        self._playback = Playback(node)
         self.inputs = [CameraInput(node, name, topics, node.poses, self._tf, self._on_frame)
                        for name, topics in self._topics().items()]
         node.steady_timer(0.5, self._on_timer)
@@ -149,6 +151,9 @@ class Ingestion:
         """Report why a camera is silent, if it is."""
         patience = self._node.config.explain_after_s
         if not patience:
+            return
+        if self._playback.ended_since(camera.heard):
+            self._node.diagnostics.state(camera.name, 'bag_ended', 'the bag has been played')
             return
         silent_s = time.monotonic() - camera.heard
         trouble = camera.silence() if silent_s > patience else camera.info_silence()

@@ -4,6 +4,7 @@
 
 import importlib.util
 from pathlib import Path
+import time
 
 import pytest
 
@@ -11,11 +12,13 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseArray  # noqa: E402
 from hooc_perception.nodes.ingestion_node import IngestionNode  # noqa: E402
+from hooc_perception.ros.health import playback  # noqa: E402
 from hooc_perception.ros.inputs.camera_topics import DRIVERS  # noqa: E402
 from hooc_perception.ros.qos import qos  # noqa: E402
 from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from rclpy.parameter import Parameter  # noqa: E402
 from sensor_msgs.msg import Image  # noqa: E402
+from std_msgs.msg import String  # noqa: E402
 
 spec = importlib.util.spec_from_file_location('raw_camera', Path(__file__).with_name(
     'raw_camera.py'))
@@ -139,3 +142,20 @@ def test_a_timer_that_fails_does_not_end_the_node(bench, monkeypatch):
     assert sends(bench, RawCamera(bench, 'a'), heard)
     monkeypatch.undo()
     assert bench.spin(lambda: bench.reasons(node)['timer'][0] == 'ok')
+
+
+def test_silence_after_a_bag_has_ended_is_no_fault(bench):
+    node, heard = ingestion(bench, 'a', explain_after_s=0.3)
+    status = bench.peer.create_publisher(String, 'replay/status', qos('replay/status'))
+    status.publish(String(data='{"state": "playing"}'))
+    raw = RawCamera(bench, 'a')
+    assert sends(bench, raw, heard)
+    status.publish(String(data='{"state": "finished"}'))
+    assert bench.spin(lambda: bench.reasons(node)['a'][0] == 'bag_ended')
+    bench.rest(1.0)
+    assert bench.reasons(node)['a'][0] == 'bag_ended'
+    # From now on there is a camera, whose silence is worth a report.
+    assert bench.spin(lambda: raw.send(10 ** 12) or time.monotonic() > (
+        node.work._playback._ended + playback.LATE_S + 0.1))
+    raw.send(2 * 10 ** 12)
+    assert bench.spin(lambda: bench.reasons(node)['a'][0] == 'no_messages')

@@ -7,6 +7,8 @@ import time
 from typing import Any
 
 from hooc_perception.chain import CHAIN, PARSING
+from hooc_perception.ros.lifecycle.parameters import switch_text
+from hooc_perception.ros.outputs.adapters.guard import is_on
 from hooc_perception.supervisor.displayed import Displayed
 from hooc_perception.supervisor.retraction import Retraction
 from hooc_perception.supervisor.supervisor import Supervisor
@@ -14,7 +16,8 @@ from rclpy.parameter import Parameter
 from std_srvs.srv import Trigger
 
 # Parameters of the parsing node that messages on its behalf depend on.
-OF_PARSING = ('target_frame', 'use_sim_time', 'publish_detections', 'planning_scene')
+SWITCHES = ('publish_detections', 'planning_scene')
+OF_PARSING = ('target_frame', 'use_sim_time', *SWITCHES)
 # Period and duration of the retraction: subscribers take a moment to be discovered.
 REPEAT_S, DURATION_S = 0.5, 3.0
 
@@ -44,8 +47,8 @@ class Retractor:
 
     def adapt(self, parameters: Mapping[str, Any]) -> None:
         """Follow changed parameters of the parsing node: its frame, its clock, its topics."""
-        self._parsing.update((name, parameters[name]) for name in OF_PARSING
-                             if name in parameters)
+        self._parsing.update((name, switch_text(parameters[name]) if name in SWITCHES
+                              else parameters[name]) for name in OF_PARSING if name in parameters)
         known = self._parsing
         if len(known) < len(OF_PARSING):
             return      # a change before `ask_parsing` knows the rest
@@ -81,7 +84,8 @@ class Retractor:
             return False
         if self._retraction is None:
             self._retraction = Retraction(self._node, self._displayed,
-                                          self._parsing['publish_detections'])
+                                          is_on(self._parsing['publish_detections'],
+                                                'vision_msgs'))
         self._retraction.publish(self._parsing['target_frame'])
         self._published = time.monotonic()
         self._until = self._published + duration_s

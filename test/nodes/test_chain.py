@@ -281,7 +281,7 @@ def test_detect_survives_a_clock_that_is_set_back(chain):
 
 
 @pytest.mark.parametrize('parameter, value, package', [
-    ('publish_tf', True, 'tf2_msgs'), ('publish_detections', True, 'vision_msgs'),
+    ('publish_tf', True, 'tf2_msgs'), ('publish_detections', 'on', 'vision_msgs'),
     ('planning_scene', 'box', 'moveit_msgs')])
 def test_packages_that_are_not_there_are_missed_when_configuring(bench, folder, parameter, value,
                                                                  package):

@@ -116,7 +116,8 @@ class PoseParameters:
 def pose_numbers(key: str, value: Any) -> tuple[float, ...]:
     """Return the value of a parameter as a tuple of 0 or 7 floats; HoocError for no pose."""
     try:
-        pose = tuple(float(x) for x in value)
+        # An empty list in a file, as `ros2 param dump` writes it, arrives as None.
+        pose = tuple(float(x) for x in (() if value is None else value))
     except (TypeError, ValueError):
         raise HoocError(f'parameter {key} is {value!r}; give x y z qx qy qz qw') from None
     if len(pose) not in (0, 7):

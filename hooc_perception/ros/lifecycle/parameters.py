@@ -41,8 +41,8 @@ def descriptor(f: Field) -> ParameterDescriptor:
     m = f.metadata
     message = ParameterDescriptor(description=m['doc'] + (f' [{m["unit"]}]' if m['unit'] else ''))
     message.read_only = m.get('read_only', False)
-    # An empty list has no type for rclpy to infer.
-    message.dynamic_typing = isinstance(f.default, tuple)
+    # An empty list has no type for rclpy to infer. YAML reads a bare `on` or `off` as a Boolean.
+    message.dynamic_typing = isinstance(f.default, tuple) or _is_switch(f)
     low, high = m['low'], m['high']
     if low is not None or high is not None:
         if isinstance(f.default, int):
@@ -134,9 +134,28 @@ class Parameters:
 
 
 def _from_ros(value: Any, f: Field) -> Any:
-    """Return a parameter's value as the type of its field; the Config judges the rest."""
+    """
+    Return a parameter's value as the type of its field; the Config judges the rest.
+
+    An empty list in a file, as `ros2 param dump` writes it, arrives as None.
+    """
+    if value is None and isinstance(f.default, tuple):
+        return ()
+    if isinstance(value, bool) and _is_switch(f):
+        return switch_text(value)
+    listed: Any = value
     is_list = isinstance(f.default, tuple) and not isinstance(value, (str, bytes))
-    return tuple(value) if is_list and hasattr(value, '__iter__') else value
+    return tuple(listed) if is_list and hasattr(value, '__iter__') else value
+
+
+def _is_switch(f: Field) -> bool:
+    """Return whether a parameter is text that may be `off`."""
+    return 'off' in (f.metadata['choices'] or ())
+
+
+def switch_text(value: Any) -> Any:
+    """Return `on` or `off` for a Boolean, anything else as it is."""
+    return {True: 'on', False: 'off'}[value] if isinstance(value, bool) else value
 
 
 def _checked(section: str, config: C, values: Mapping[str, Any]) -> C:

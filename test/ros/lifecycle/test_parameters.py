@@ -22,6 +22,7 @@ class Knobs(Config):
     mode: str = param('a', 'Which way.', choices=('a', 'b'))
     fast: bool = param(False, 'Hurry.', runtime=True)
     names: tuple = param((), 'Who.')
+    output: str = param('auto', 'Whether.', choices=('auto', 'on', 'off'), runtime=True)
 
 
 def declared(context, overrides=(), unconfigured=True):
@@ -44,6 +45,17 @@ def test_overrides_apply(context):
     _, parameters = declared(context, {'deep.limit': 9, 'names': ['x', 'y'], 'mode': 'b'})
     assert parameters['deep'].limit == 9
     assert parameters[''].names == ('x', 'y') and parameters[''].mode == 'b'
+
+
+@pytest.mark.parametrize('value, means', [
+    (True, 'on'), (False, 'off'), ('on', 'on'), ('auto', 'auto')])
+def test_yaml_reads_on_and_off_as_booleans(context, value, means):
+    node, parameters = declared(context, {'output': value}, unconfigured=False)
+    assert parameters[''].output == means
+    for other, text in ((not value, 'on' if not value else 'off'), ('auto', 'auto')):
+        assert node.set_parameters([Parameter('output', value=other)])[0].successful
+        assert parameters[''].output == text
+    assert not node.set_parameters([Parameter('output', value='maybe')])[0].successful
 
 
 @pytest.mark.parametrize('name, value', [

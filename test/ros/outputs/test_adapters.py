@@ -90,13 +90,22 @@ def xyz(v):
     return (v.x, v.y, v.z)
 
 
-def test_everything_is_off_by_default():
+def test_what_is_not_installed_is_off_by_default(monkeypatch):
+    for package in ('tf2_msgs', 'vision_msgs', 'moveit_msgs'):
+        monkeypatch.setitem(sys.modules, f'{package}.msg', None)
     node = Node()
     assert adapters_of(node) == [] and node.sent == {}
 
 
+def test_what_is_installed_is_on_by_default(stubs):
+    for package in ('tf2_msgs', 'vision_msgs', 'moveit_msgs'):
+        stubs.install(package)
+    assert [type(a).__name__ for a in adapters_of(Node())] == ['ObjectFrames', 'Detections']
+    assert adapters_of(Node(publish_tf='off', publish_detections='off')) == []
+
+
 @pytest.mark.parametrize('parameter, value, package', [
-    ('publish_tf', True, 'tf2_msgs'), ('publish_detections', True, 'vision_msgs'),
+    ('publish_tf', 'on', 'tf2_msgs'), ('publish_detections', 'on', 'vision_msgs'),
     ('planning_scene', 'mesh', 'moveit_msgs')])
 def test_a_missing_package_is_named(parameter, value, package, monkeypatch):
     monkeypatch.setitem(sys.modules, package, None)
@@ -107,7 +116,7 @@ def test_a_missing_package_is_named(parameter, value, package, monkeypatch):
 
 def test_tf_has_a_frame_an_object(stubs, scene):
     stubs.install('tf2_msgs')
-    node = Node(publish_tf=True)
+    node = Node(publish_tf='on')
     adapter, = adapters_of(node)
     adapter.publish(scene)
     message, = node.sent['/tf']
@@ -125,7 +134,7 @@ def test_tf_has_a_frame_an_object(stubs, scene):
 
 def test_detections_golden(stubs, scene):
     stubs.install('vision_msgs')
-    node = Node(publish_detections=True)
+    node = Node(publish_detections='on')
     adapter, = adapters_of(node)
     adapter.publish(scene)
     data, read = stubs.cdr(node.sent['objects/detections'][0])

@@ -9,6 +9,7 @@ from typing import Protocol
 from hooc_perception.core.config import Config, param
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.outputs.adapters.detections import Detections
+from hooc_perception.ros.outputs.adapters.guard import is_on, SWITCH
 from hooc_perception.ros.outputs.adapters.object_frames import ObjectFrames
 from hooc_perception.ros.outputs.adapters.planning_scene import PlanningSceneDiffs
 from hooc_perception.ros.outputs.detected import DetectedScene
@@ -26,11 +27,12 @@ class Adapter(Protocol):
 
 @dataclass(frozen=True)
 class AdapterConfig(Config):
-    """Parameters of the adapters; all of them are off by default."""
+    """Parameters of the adapters."""
 
-    publish_tf: bool = param(False, 'Publish a frame `<category>_<id>` per object on /tf; needs '
-                             'tf2_msgs.')
-    publish_detections: bool = param(False, 'Publish objects/detections; needs vision_msgs.')
+    publish_tf: str = param('auto', 'Publish a frame `<category>_<id>` per object on /tf; auto = '
+                            'where tf2_msgs is installed, which it needs.', choices=SWITCH)
+    publish_detections: str = param('auto', 'Publish objects/detections; auto = where '
+                                    'vision_msgs is installed, which it needs.', choices=SWITCH)
     planning_scene: str = param('off', 'Keep the objects in the planning scene of MoveIt, as '
                                 'their meshes or as their bounding boxes; needs moveit_msgs.',
                                 choices=('off', 'mesh', 'box'))
@@ -49,9 +51,9 @@ def adapters_of(node: StageNode) -> list[Adapter]:
     :raises HoocError: if the message package of one of them is not installed.
     """
     config, chosen = node.config, []
-    if config.publish_tf:
+    if is_on(config.publish_tf, 'tf2_msgs'):
         chosen.append(ObjectFrames(node))
-    if config.publish_detections:
+    if is_on(config.publish_detections, 'vision_msgs'):
         chosen.append(Detections(node))
     if config.planning_scene != 'off':
         chosen.append(PlanningSceneDiffs(node, config.planning_scene,

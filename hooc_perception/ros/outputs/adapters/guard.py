@@ -7,6 +7,23 @@ from typing import Any
 
 from hooc_perception.errors import HoocError
 
+SWITCH = ('auto', 'on', 'off')
+
+
+def is_on(switch: str, package: str) -> bool:
+    """
+    Return whether an output in the messages of a package is wanted.
+
+    :param switch: one of SWITCH; auto = where the package can be imported.
+    """
+    if switch != 'auto':
+        return switch == 'on'
+    try:
+        importlib.import_module(f'{package}.msg')
+    except ImportError:
+        return False
+    return True
+
 
 def messages_of(package: str, parameter: str) -> Any:
     """
@@ -20,4 +37,4 @@ def messages_of(package: str, parameter: str) -> Any:
     except ImportError as error:
         raise HoocError(f'parameter {parameter} needs the package {package}, which is not '
                         f'installed ({error}); install ros-jazzy-{package.replace("_", "-")} '
-                        f'or leave {parameter} at its default') from error
+                        f'or set {parameter} to off') from error

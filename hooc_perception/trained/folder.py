@@ -10,7 +10,8 @@ The MODEL folder: the output of `hooc train` and the input of every other comman
     classifier/<key>.npy    the arrays of the decision forests, memory-mapped when read
 
 It holds plain data only. Every file is listed with its size and SHA-256 in model.json; reading
-checks all of them, unpickles nothing and follows no path out of the folder.
+checks all of them, unpickles nothing and follows no path out of the folder. Links are followed
+where the folder mirrors another MODEL folder file by file, its model.json included.
 """
 
 from collections.abc import Mapping, Sequence
@@ -27,11 +28,11 @@ from hooc_perception.errors import HoocError
 from hooc_perception.trained.integrity import (
     check_file,
     check_name,
+    FILE_NAME,
     load_plain_array,
     PLAIN_KINDS,
 )
 from hooc_perception.trained.metadata import (
-    FILE_NAME,
     file_records,
     Metadata,
     read_metadata,

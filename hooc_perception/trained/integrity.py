@@ -19,6 +19,7 @@ from hooc_perception.core.arrays import AnyArray
 from hooc_perception.errors import HoocError
 import numpy as np
 
+FILE_NAME = 'model.json'
 MAX_FILE_BYTES = 2 * 10**9
 # Written archives are not compressed; mesh data never compresses by more than this factor.
 MAX_COMPRESSION = 20
@@ -47,12 +48,23 @@ def check_file(folder: Path, name: str, files: Mapping[str, FileRecord]) -> None
     file, declared = folder / name, files[name]
     if not file.is_file():
         raise HoocError(f'{file} is missing; copy the whole model folder or train again')
-    if not file.resolve().is_relative_to(folder.resolve()):
+    real = file.resolve()
+    if not real.is_relative_to(folder.resolve()) and real != linked_folder(folder) / name:
         raise HoocError(f'{file} points outside the model folder; copy the file itself')
     if not declared.size == file.stat().st_size <= MAX_FILE_BYTES or (
             sha256_of(file) != declared.sha256):
         raise HoocError(f'{file} is damaged (its checksum differs from model.json); copy it '
                         'again or train again')
+
+
+def linked_folder(folder: Path) -> Path:
+    """
+    Return the folder that holds the model.json itself, where that of `folder` is a link.
+
+    `colcon build --symlink-install` mirrors a folder file by file. A link to the file of the same
+    name beside that model.json is as safe as opening that folder.
+    """
+    return (folder / FILE_NAME).resolve().parent
 
 
 def sha256_of(file: Path) -> str:

@@ -10,11 +10,16 @@ from typing import Any
 from hooc_perception.chain import check_categories
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
-from hooc_perception.trained.integrity import check_name, FileRecord, sha256_of, short_reason
+from hooc_perception.trained.integrity import (
+    check_name,
+    FILE_NAME,
+    FileRecord,
+    sha256_of,
+    short_reason,
+)
 import numpy as np
 
 FORMAT = 'hooc-model/1'
-FILE_NAME = 'model.json'
 MAX_JSON_BYTES = 4 * 10**6
 MAX_SIDE = 8192
 

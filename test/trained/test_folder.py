@@ -5,6 +5,7 @@
 from dataclasses import replace
 import hashlib
 import json
+from pathlib import Path
 import shutil
 
 from hooc_perception.core.types import Camera
@@ -249,6 +250,30 @@ def test_paths_out_of_the_folder(folder, tmp_path):
     shutil.move(folder / 'classifier' / 'leaves.npy', outside)
     (folder / 'classifier' / 'leaves.npy').symlink_to(outside)
     _rejected(folder, 'points outside')
+
+
+def _mirror(folder, link):
+    """Make the folder `link` with a link to each file of `folder`, as colcon does."""
+    for file in filter(Path.is_file, sorted(folder.rglob('*'))):
+        target = link / file.relative_to(folder)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.symlink_to(file)
+    return link
+
+
+def test_a_folder_of_links_to_a_model_folder(folder, tmp_path):
+    build = _mirror(folder, tmp_path / 'build')
+    install = _mirror(build, tmp_path / 'install')
+    found, wanted = load_model_folder(install), load_model_folder(folder)
+    assert found.mesh_sha256 == wanted.mesh_sha256
+    assert all(np.array_equal(found.classifier[key], wanted.classifier[key])
+               for key in wanted.classifier)
+    leaves = install / 'classifier' / 'leaves.npy'
+    outside = shutil.copyfile(folder / 'classifier' / 'leaves.npy', tmp_path / 'leaves.npy')
+    for other in (outside, folder / 'models.npz'):
+        leaves.unlink()
+        leaves.symlink_to(other)
+        _rejected(install, 'points outside')
 
 
 def _replace(folder, file, write):

@@ -73,8 +73,8 @@ makes_venv() { "$1" -c 'import ensurepip, venv' 2>/dev/null; }
 
 find_python() {
   local test=$1 name
-  for name in ${HOOC_PYTHON:-} python3.12 /usr/bin/python3.12 python3.11 /usr/bin/python3.11 python3 \
-      /usr/bin/python3; do
+  for name in ${HOOC_PYTHON:+"$HOOC_PYTHON"} python3.12 /usr/bin/python3.12 python3.11 \
+      /usr/bin/python3.11 python3 /usr/bin/python3; do
     if runs "$name" && "$test" "$name"; then
       "$name" -c 'import sys; print(sys.executable)'
       return 0
@@ -84,6 +84,8 @@ find_python() {
 }
 
 if ! "$VENV/bin/python" -c 'import pip' 2>/dev/null; then
+  [[ -z ${HOOC_PYTHON:-} ]] || runs "$HOOC_PYTHON" \
+    || die "HOOC_PYTHON='$HOOC_PYTHON' does not start Python 3.12 or 3.11; correct it or unset it"
   PYTHON=$(find_python makes_venv || true)
   if [[ -z $PYTHON ]]; then
     BARE=$(find_python true || true)

@@ -64,20 +64,46 @@ def test_a_moved_tree_sets_up_again(tree):
     assert any('pip install' in call for call in set_up(moved))
 
 
-def test_a_python_that_only_pretends_is_passed_over(tree, tmp_path_factory):
-    pretender = tmp_path_factory.mktemp('shims') / 'python3.12'
-    pretender.write_text('#!/bin/sh\necho "pyenv: python3.12: command not found" >&2\nexit 127\n')
-    pretender.chmod(0o755)
-    text = (tree / 'scripts/setup.sh').read_text()
+def pretender(folder):
+    """Return a program called python3.12 that starts no Python, as a pyenv shim may be."""
+    program = folder / 'python3.12'
+    program.write_text('#!/bin/sh\necho "pyenv: python3.12: command not found" >&2\nexit 127\n')
+    program.chmod(0o755)
+    return program
+
+
+def found_python(wanted, *first):
+    """Return what setup.sh's search for Python prints, with HOOC_PYTHON and folders first."""
+    text = (ROOT / 'scripts/setup.sh').read_text()
     functions = text[text.index('runs()'):text.index('if ! "$VENV/bin/python"')]
     run = subprocess.run(['bash', '-c', functions + '\nfind_python runs'], text=True,
-                         capture_output=True, env={
-                             **os.environ, 'HOOC_PYTHON': sys.executable,
-                             'PATH': f'{pretender.parent}:{os.environ["PATH"]}'})
-    assert run.returncode == 0
-    assert Path(run.stdout.strip()).resolve() == Path(sys.executable).resolve()
-    run = subprocess.run(['bash', '-c', functions + f'\nruns {pretender}'])
-    assert run.returncode != 0
+                         capture_output=True, check=True, env={
+                             **os.environ, 'HOOC_PYTHON': str(wanted),
+                             'PATH': ':'.join((*map(str, first), os.environ['PATH']))})
+    return run.stdout.strip()
+
+
+def test_a_python_that_only_pretends_is_passed_over(tmp_path):
+    assert not Path(found_python(sys.executable, pretender(tmp_path).parent)).is_relative_to(
+        tmp_path)
+    assert not Path(found_python('', pretender(tmp_path).parent)).is_relative_to(tmp_path)
+
+
+def test_the_path_of_python_may_hold_spaces(tmp_path):
+    folder = tmp_path / 'my tools'
+    folder.mkdir()
+    (folder / 'python 3').symlink_to(sys.executable)
+    assert found_python(folder / 'python 3') == str(folder / 'python 3')
+
+
+def test_a_python_that_is_asked_for_must_start(tree, tmp_path_factory):
+    shutil.rmtree(tree / '.venv')
+    wanted = pretender(tmp_path_factory.mktemp('my shims'))
+    run = subprocess.run(['bash', 'scripts/setup.sh'], cwd=tree, capture_output=True, text=True,
+                         env={**os.environ, 'HOOC_NO_APT': '1', 'HOOC_PYTHON': str(wanted)})
+    assert run.returncode == 1
+    assert f"HOOC_PYTHON='{wanted}' does not start Python 3.12 or 3.11" in run.stderr
+    assert not (tree / '.venv').exists()
 
 
 def test_this_environments_ros_wins_over_a_sourced_one(tmp_path):

@@ -107,8 +107,10 @@ def test_what_is_installed_is_on_by_default(stubs):
 @pytest.mark.parametrize('parameter, value, package', [
     ('publish_tf', 'on', 'tf2_msgs'), ('publish_detections', 'on', 'vision_msgs'),
     ('planning_scene', 'mesh', 'moveit_msgs')])
-def test_a_missing_package_is_named(parameter, value, package, monkeypatch):
-    monkeypatch.setitem(sys.modules, package, None)
+def test_a_missing_package_is_named(parameter, value, package, stubs, monkeypatch):
+    stubs.install(package)      # another test may have imported the real one
+    for module in (package, f'{package}.msg'):
+        monkeypatch.setitem(sys.modules, module, None)
     with pytest.raises(HoocError, match=f'{parameter} needs the package {package}.*ros-jazzy-'
                        + package.replace('_', '-')):
         adapters_of(Node(**{parameter: value}))

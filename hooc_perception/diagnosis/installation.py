@@ -39,7 +39,8 @@ PACKAGES: dict[str, tuple[str, str]] = {
 # Shared library -> the Debian and Ubuntu package that holds it.
 LIBRARIES = {'libusb-1.0.so.0': 'libusb-1.0-0', 'libGL.so.1': 'libgl1', 'libEGL.so.1': 'libegl1',
              'libgomp.so.1': 'libgomp1', 'libXrender.so.1': 'libxrender1'}
-SETUP = 'run "make setup" in the source tree'
+SETUP = ('run "make setup" in the source tree, or "pip install -r requirements-ros.txt" next to a '
+         'ROS installation')
 LOW_DISK_GB, LOW_MEMORY_GB = 1.0, 4.0
 
 GL_PROBE = """
@@ -97,7 +98,7 @@ def check_python(version: tuple[int, int] | None = None) -> Finding:
     if version in PYTHONS:
         return Finding(OK, 'Python', text)
     return Finding(ERROR, 'Python', f'{version[0]}.{version[1]} is not supported; '
-                   'install Python 3.12 or 3.11, remove .venv and ' + SETUP)
+                   'install Python 3.12 or 3.11, remove .venv and set up again: ' + SETUP)
 
 
 def check_libraries(libraries: Mapping[str, str] | None = None) -> Iterator[Finding]:
@@ -143,9 +144,14 @@ def check_packages(packages: Mapping[str, tuple[str, str]] | None = None) -> Ite
 
 
 def pinned() -> dict[str, str]:
-    """Return {lower-case name: version} of requirements.txt, {} outside of a source tree."""
-    path = Path(__file__).resolve().parents[2] / 'requirements.txt'
-    if not path.is_file():
+    """
+    Return {lower-case name: version} of requirements.txt where `make setup` made this environment.
+
+    {} elsewhere: other environments have versions of their own, those of apt next to ROS.
+    """
+    root = Path(__file__).resolve().parents[2]
+    path = root / 'requirements.txt'
+    if Path(sys.prefix).resolve() != (root / '.venv').resolve() or not path.is_file():
         return {}
     lines = (line.split(';')[0].strip().partition('==') for line in path.read_text().splitlines()
              if '==' in line and not line.startswith('#'))

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """The check of an installation: true about this one, and clear about broken ones."""
 
+from pathlib import Path
+
 from hooc_perception import extras
 from hooc_perception.diagnosis import installation
 from hooc_perception.diagnosis.finding import ERROR, Finding, OK, WARNING, worst
@@ -67,6 +69,14 @@ def test_a_version_that_is_not_the_pinned_one(monkeypatch):
     monkeypatch.setattr(installation, 'pinned', lambda: {'numpy': '0.0.1'})
     finding, = installation.check_packages({'numpy': ('numpy', 'anything')})
     assert finding.level == WARNING and '0.0.1' in finding.text
+
+
+def test_pins_hold_where_setup_made_the_environment(monkeypatch, tmp_path):
+    root = Path(installation.__file__).resolve().parents[2]
+    monkeypatch.setattr(installation.sys, 'prefix', str(root / '.venv'))
+    assert 'numpy' in installation.pinned()
+    monkeypatch.setattr(installation.sys, 'prefix', str(tmp_path))
+    assert installation.pinned() == {}
 
 
 def test_no_shared_memory(tmp_path):

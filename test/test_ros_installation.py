@@ -31,6 +31,12 @@ OPTIONAL = {'vision_msgs', 'moveit_msgs', 'pyrender', 'rerun', 'distributed'}
 # Needed, but not by an import statement: networkx and collada by trimesh, tf2_msgs by name, the
 # rest by the command `ros2 launch` and by Open3D.
 NOT_IMPORTED = {'python3-networkx', 'python3-collada', 'tf2_msgs', 'ros2launch', 'libusb-1.0'}
+# Of numpy 2, which Ubuntu 24.04 does not have.
+NUMPY_2 = {'acos', 'acosh', 'asin', 'asinh', 'astype', 'atan', 'atan2', 'atanh', 'bitwise_count',
+           'bitwise_invert', 'concat', 'cumulative_prod', 'cumulative_sum', 'isdtype', 'matmat',
+           'matrix_norm', 'matrix_transpose', 'matvec', 'permute_dims', 'pow', 'svdvals',
+           'trapezoid', 'unique_all', 'unique_counts', 'unique_inverse', 'unique_values',
+           'unstack', 'vecdot', 'vecmat', 'vector_norm'}
 APT_ONLY = {'opencv-contrib-python-headless'}      # apt's has no metadata that pip could see
 
 
@@ -92,3 +98,27 @@ def test_the_packages_of_ubuntu_24_04_are_in_the_ranges(name, version):
 
 def test_numpy_2_is_never_installed_next_to_ros():
     assert not rows()['numpy'].specifier.contains('2.0.0')
+
+
+def newer_than_ubuntu(code):
+    """Return what a source uses of numpy 2, and of scipy as it is since 1.15."""
+    found = []
+    for node in ast.walk(ast.parse(code)):
+        if isinstance(node, ast.Attribute) and node.attr in NUMPY_2 and (
+                ast.unparse(node.value) in ('np', 'np.linalg')):
+            found.append(ast.unparse(node))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == 'Rotation.random' and (
+                node.keywords):
+            found.append(ast.unparse(node))
+    return found
+
+
+def test_no_source_needs_more_than_ubuntu_24_04_has():
+    assert sorted(newer_than_ubuntu(
+        'np.bitwise_count(a); Rotation.random(rng=g); np.linalg.norm(b)')) == [
+            'Rotation.random(rng=g)', 'np.bitwise_count']
+    sources = [path for part in ('hooc_perception', 'test')
+               for path in (ROOT / part).rglob('*.py')]
+    assert len(sources) > 200
+    assert {str(path.relative_to(ROOT)): found for path in sources
+            if (found := newer_than_ubuntu(path.read_text()))} == {}

@@ -11,7 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 RNG = np.random.default_rng(3)
-POSES = [(RNG.normal(size=3), Rotation.random(rng=RNG).as_quat()) for _ in range(6)]
+POSES = [(RNG.normal(size=3), Rotation.random(None, RNG).as_quat()) for _ in range(6)]
 POSES.append((np.zeros(3), np.array([0, 0, 0, 1.0])))
 
 

@@ -22,7 +22,7 @@ def cluttered(things):
     meshes = []
     for i in range(9):
         model = things[i % 3]
-        R = Rotation.random(rng=rng).as_matrix()
+        R = Rotation.random(None, rng).as_matrix()
         at = rng.uniform([-0.3, -0.3, 0.0], [0.3, 0.3, 0.25])
         meshes.append((model.vertices * rng.uniform(0.7, 1.6, 3) @ R.T + at, model.faces))
     return meshes

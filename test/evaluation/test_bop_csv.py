@@ -37,7 +37,7 @@ def test_truth_comes_back_as_scene_gt_says(shared_scenes, tmp_path):
 def test_results_of_another_table_frame_are_brought_into_this_one(shared_scenes):
     scene_set = load_scene_set(shared_scenes / 'bop_ycbv').selected(['000051_000001'])
     (scene,), rng = scene_set.scenes, np.random.default_rng(0)
-    T_other_source = matrix_from_pose(rng.normal(size=3), Rotation.random(rng=rng).as_quat())
+    T_other_source = matrix_from_pose(rng.normal(size=3), Rotation.random(None, rng).as_quat())
     T_other_ours = T_other_source @ inverse(scene.table.T_table_source)
 
     def placed(T, true):

@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 
 def some_pose(model, rng, spread=0.05):
-    return PosedObject(model.name, rng.normal(size=3) * spread, Rotation.random(rng=rng).as_quat(),
+    return PosedObject(model.name, rng.normal(size=3) * spread,
+                       Rotation.random(None, rng).as_quat(),
                        model.extents * rng.uniform(0.7, 1.4, 3))
 
 

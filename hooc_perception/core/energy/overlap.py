@@ -161,8 +161,8 @@ class OverlapTerm:
         shares = np.zeros((self.n, self.n))
         for k in range(self.n):
             run = slice(self._start[k], self._start[k + 1])
-            shares[k, self._other[run]] = (np.bitwise_count(self._bits[run]).sum(1)
-                                           / self._count)
+            bits = np.unpackbits(self._bits[run].view(np.uint8), axis=1)
+            shares[k, self._other[run]] = bits.sum(1) / self._count
         return shares
 
     def evaluate(self, mask: BoolArray) -> float:

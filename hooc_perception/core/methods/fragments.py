@@ -159,7 +159,7 @@ def _drawn(p: UInt8Array, longest: float, config: FragmentConfig,
     pixel = rng.choice(len(p), m, p=p / p.sum(dtype=np.float64)).astype(np.int32)
     low, high = sorted((config.size_low, config.size_high))
     scale = np.exp(rng.uniform(np.log(low), np.log(high), m))
-    R = Rotation.random(m, rng=rng).as_matrix()
+    R = Rotation.random(m, rng).as_matrix()     # by place: scipy has renamed the argument
     # Uniform in a ball: a random direction and the cube root of a uniform radius.
     shift = rng.normal(size=(m, 3))
     shift *= (config.shift * longest * scale * rng.random(m) ** (1 / 3)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 def test_smallest_eigenvector(eigenvalues):
     rng = np.random.default_rng(1)
     for _ in range(20):
-        R = Rotation.random(rng=rng).as_matrix()
+        R = Rotation.random(None, rng).as_matrix()
         C = R @ np.diag(eigenvalues) @ R.T
         C = (C + C.T) / 2
         vector = kernel.smallest_eigenvector(C)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 def test_rotations_and_products_are_scipys():
     rng = np.random.default_rng(0)
     for _ in range(20):
-        a, b = Rotation.random(2, rng=rng)
+        a, b = Rotation.random(2, rng)
         h, R, out = np.zeros(10), np.empty((3, 3)), np.empty(4)
         h[3:7] = a.as_quat()
         kernel.rotation_of(h, R)
@@ -28,7 +28,7 @@ def test_rotations_and_products_are_scipys():
 
 def test_a_hypothesis_scales_turns_and_moves_its_model():
     rng = np.random.default_rng(3)
-    h = np.concatenate([rng.normal(size=3), Rotation.random(rng=rng).as_quat(), [1.2, 0.7, 1.0]])
+    h = np.concatenate([rng.normal(size=3), Rotation.random(None, rng).as_quat(), [1.2, 0.7, 1.0]])
     vertices, out = rng.normal(size=(20, 3)), np.empty((20, 3))
     kernel.posed(h, vertices, out)
     expected = (Rotation.from_quat(h[kernel.QUATERNION]).apply(vertices * h[kernel.SCALE])

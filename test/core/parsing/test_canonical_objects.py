@@ -13,7 +13,7 @@ ONE = np.ones(3)
 
 
 def turns(n, seed=0):
-    return Rotation.random(n, rng=np.random.default_rng(seed)).as_matrix()
+    return Rotation.random(n, np.random.default_rng(seed)).as_matrix()
 
 
 @pytest.mark.parametrize('orders', [(1, 1, 1), (1, 1, 2), (2, 2, 2), (2, 2, 4), (4, 4, 4),
@@ -104,7 +104,7 @@ def test_what_is_canonical_keeps_its_bits(things):
     category = rng.integers(1, 4, n).astype(np.uint16)
     extents = np.array([things[c - 1].extents for c in category])
     given = Candidates(category, rng.normal(size=(n, 3)),
-                       Rotation.random(n, rng=rng).as_quat(),
+                       Rotation.random(n, rng).as_quat(),
                        (extents * rng.uniform(0.9, 1.1, (n, 3))).astype(np.float32),
                        np.ones(n, np.float32))
     once = canonical_objects(given, things)

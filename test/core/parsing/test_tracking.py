@@ -107,7 +107,7 @@ def test_orientations_of_symmetric_objects_do_not_jump(things):
     for step in range(40):
         turned = [(c, t, Rotation.from_rotvec(rng.normal(0, 0.02, 3)) * r * Rotation.from_matrix(
             symmetry_rotations(o)[rng.integers(len(symmetry_rotations(o)))])
-            * (Rotation.random(rng=rng) if c == BALL else Rotation.identity()))
+            * (Rotation.random(None, rng) if c == BALL else Rotation.identity()))
             for (c, t, r), o in zip(true, orders)]
         given = found(things, *turned)
         _, objects = tracker.update(step * S, given)

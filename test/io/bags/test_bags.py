@@ -44,7 +44,7 @@ def make_set(path, depth_unit=0.001):
                camera('left', rng, [0.1, -0.2, 1e-3, 2e-3, 0.05, 0.3, 0.1, 0.2],
                       'rational_polynomial'))
     meshes = {'ball': trimesh.creation.icosphere(1, 0.04), 'box': trimesh.creation.box((1, 1, 1))}
-    truth = (TrueObject('box', rng.normal(size=3), Rotation.random(rng=rng).as_quat(),
+    truth = (TrueObject('box', rng.normal(size=3), Rotation.random(None, rng).as_quat(),
                         np.array([0.1, 0.2, 0.06]), 0.5),)
     depth = [np.where(rng.random((HEIGHT, WIDTH)) < 0.1, np.nan,
                       rng.uniform(0.5, 3, (HEIGHT, WIDTH))) for _ in cameras]

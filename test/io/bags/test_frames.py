@@ -20,7 +20,7 @@ def stamped(parent, child, T):
 
 def random_transforms(n):
     rng = np.random.default_rng(0)
-    return [matrix_from_pose(rng.normal(size=3), Rotation.random(rng=rng).as_quat())
+    return [matrix_from_pose(rng.normal(size=3), Rotation.random(None, rng).as_quat())
             for _ in range(n)]
 
 

@@ -36,7 +36,7 @@ def written(tmp_path, rng):
     cameras = tuple(camera(name, rng) for name in ('left', 'right'))
     meshes = {'ball': trimesh.creation.icosphere(1, 0.04),
               'box': trimesh.creation.box((0.1, 0.2, 0.05))}
-    truth = (TrueObject('box', rng.normal(size=3), Rotation.random(rng=rng).as_quat(),
+    truth = (TrueObject('box', rng.normal(size=3), Rotation.random(None, rng).as_quat(),
                         np.array([0.1, 0.2, 0.06]), 0.5),
              TrueObject('ball', rng.normal(size=3), np.array([0, 0, 0, 1.0]), np.full(3, 0.08)))
 

@@ -13,7 +13,8 @@ from hooc_perception.io.scenes.scene_set import SceneSet
 from hooc_perception.objects.mesh import mesh_box
 
 _OBJECT = re.compile(r'obj_(\d+)\Z')
-_SCENE = re.compile(r'(\d{6})(?:_(\d{6}))?\Z')
+# The third part is the sensor of an image without pose.
+_SCENE = re.compile(r'(\d{6})(?:_(\d{6})(?:_\w+)?)?\Z')
 _VIEW = re.compile(r'view_(\d+)\Z')
 
 

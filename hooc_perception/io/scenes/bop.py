@@ -19,19 +19,16 @@ from hooc_perception.core.geometry import inverse, pose_from_matrix
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import camera_files, fields, files, png
+from hooc_perception.io.scenes.bop_layout import groups, Shot
 from hooc_perception.io.scenes.nominal_table import nominal_cameras
 from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
 from hooc_perception.objects.mesh import mesh_box
 import numpy as np
 
 MM = 0.001
-# A recording by a moving camera has hundreds of images; this many, evenly spread, are used.
-MAX_VIEWS = 16
 _MODEL_FOLDERS = ('models', 'models_cad', 'models_reconst', 'models_eval')
 _SCENE = re.compile(r'\d{6}\Z')
 _MODEL = re.compile(r'obj_(\d{6})\.ply\Z')
-# Image id, its entry of scene_camera.json, name of its camera.
-_Shot = tuple[str, dict[str, Any], str]
 
 
 def is_bop(path: Path) -> bool:
@@ -62,12 +59,13 @@ def load_bop(path: Path, with_scenes: bool = True) -> tuple[
     for folder in sorted(p for p in split.iterdir() if p.is_dir() and _SCENE.match(p.name)):
         if with_scenes:
             scenes += _scenes(folder, categories, boxes)
-        elif groups := _groups(folder):
-            cameras = nominal_cameras([_camera(path, folder, *shot) for shot in groups[0][1]])
+        elif found := groups(folder):
+            cameras = nominal_cameras([_camera(path, shot) for shot in found[0][1]])
             return name, tuple(categories.values()), cameras, ()
     if not scenes:
         raise HoocError(f'{split}: there is no scene with images; add the folders 000001 and so '
-                        'on, each with scene_camera.json and depth/')
+                        'on, each with scene_camera.json and depth/ (or scene_camera_cam1.json '
+                        'and depth_cam1/)')
     return name, tuple(categories.values()), scenes[0].cameras, tuple(scenes)
 
 
@@ -94,66 +92,43 @@ def _categories(models: Path, info_file: Path, info: dict[str, Any]) -> dict[int
     return result
 
 
-def _groups(folder: Path) -> list[tuple[str, list[_Shot]]]:
-    """Return [(scene name, its shots)] of a scene folder."""
-    file = folder / 'scene_camera.json'
-    shots = files.read_json(file)
-    for key in shots:
-        if not key.isdecimal():
-            raise HoocError(f'{file}: the image id {fields.short_repr(key)} is not a number; '
-                            'correct it')
-    shared: list[_Shot] = []
-    groups: list[tuple[str, list[_Shot]]] = []
-    for key in sorted(shots, key=int):
-        shot = fields.mapping(shots[key], f'{file}: {key}')
-        if 'cam_R_w2c' in shot and 'cam_t_w2c' in shot:
-            shared.append((key, shot, f'view_{int(key):06d}'))
-        else:
-            groups.append((f'{folder.name}_{int(key):06d}', [(key, shot, 'camera')]))
-    if shared:
-        picks = np.unique(np.linspace(0, len(shared) - 1, min(len(shared), MAX_VIEWS)).round())
-        groups.insert(0, (folder.name, [shared[int(i)] for i in picks]))
-    return groups
-
-
 def _scenes(folder: Path, categories: Mapping[int, Category],
             boxes: '_Boxes') -> list[RecordedScene]:
     """Return the scenes of one BOP scene folder."""
-    truth_file = folder / 'scene_gt.json'
-    truths = files.read_json(truth_file) if truth_file.is_file() else {}
+    truths: dict[Path, dict[str, Any]] = {}
     scenes = []
-    for name, shots in _groups(folder):
-        cameras, depth_files, units = zip(*(_shot(folder, *shot) for shot in shots))
-        truth = _truth(truths, [key for key, _, _ in shots], cameras, truth_file, categories,
-                       boxes)
-        scenes.append(RecordedScene(name, cameras, depth_files, units, truth, table_known=False))
+    for name, shots in groups(folder):
+        for file in {shot.sensor.truth_file for shot in shots} - set(truths):
+            truths[file] = files.read_json(file) if file.is_file() else {}
+        cameras, units = zip(*map(_shot, shots))
+        truth = _truth(shots, truths, cameras, categories, boxes)
+        scenes.append(RecordedScene(name, cameras, tuple(shot.depth_file for shot in shots),
+                                    units, truth, table_known=False))
     return scenes
 
 
-def _camera(path: Path, folder: Path, key: str, shot: dict[str, Any], name: str) -> Camera:
+def _camera(path: Path, shot: Shot) -> Camera:
     """Return the Camera in the source world without reading its image."""
-    where = f'{folder / "scene_camera.json"}: {key}'
-    file = path / 'camera.json'
+    file = shot.sensor.size_file(path)
     entry = files.read_json(file) if file.is_file() else {}
-    K = fields.numbers(fields.required(shot, 'cam_K', where), 9, f'{where} cam_K')
+    K = fields.numbers(fields.required(shot.entry, 'cam_K', shot.where), 9,
+                       f'{shot.where} cam_K')
     # Without a stated image size, the principal point is taken to be near the middle.
     width, height = (
         fields.integer(entry[side], 1, fields.MAX_SIDE, f'{file}: {side}') if side in entry
         else int(np.clip(2 * centre + 1, 1, fields.MAX_SIDE).round())
         for side, centre in (('width', K[2]), ('height', K[5])))
-    return _posed_camera(shot, name, width, height, where)
+    return _posed_camera(shot.entry, shot.camera, width, height, shot.where)
 
 
-def _shot(folder: Path, key: str, shot: dict[str, Any],
-          name: str) -> tuple[Camera, Path, float]:
-    """Return (Camera in the source world, depth file, metres per count) of one image."""
-    where = f'{folder / "scene_camera.json"}: {key}'
-    file = folder / 'depth' / f'{int(key):06d}.png'
-    scale = fields.number(shot.get('depth_scale', 1.0), f'{where} depth_scale')
+def _shot(shot: Shot) -> tuple[Camera, float]:
+    """Return (Camera in the source world, metres per count) of one image."""
+    scale = fields.number(shot.entry.get('depth_scale', 1.0), f'{shot.where} depth_scale')
     if not 1e-3 <= scale <= 100:
-        raise HoocError(f'{where} depth_scale is {scale:g}; give the millimetres of one count')
-    width, height = png.png_size(file)
-    return _posed_camera(shot, name, width, height, where), file, scale * MM
+        raise HoocError(f'{shot.where} depth_scale is {scale:g}; give the millimetres of one '
+                        'count')
+    width, height = png.png_size(shot.depth_file)
+    return _posed_camera(shot.entry, shot.camera, width, height, shot.where), scale * MM
 
 
 def _posed_camera(shot: dict[str, Any], name: str, width: int, height: int,
@@ -167,20 +142,28 @@ def _posed_camera(shot: dict[str, Any], name: str, width: int, height: int,
     return Camera(name, width, height, K, np.zeros(5), inverse(T_camera_world))
 
 
-def _truth(truths: dict[str, Any], keys: Sequence[str], cameras: Sequence[Camera], file: Path,
-           categories: Mapping[int, Category],
+def _truth(shots: Sequence[Shot], truths: Mapping[Path, dict[str, Any]],
+           cameras: Sequence[Camera], categories: Mapping[int, Category],
            boxes: '_Boxes') -> tuple[TrueObject, ...] | None:
-    """Return the ground truth objects in the source world, None without annotation."""
-    annotated = [i for i, key in enumerate(keys) if key in truths]
-    if not annotated:
+    """
+    Return the ground truth objects in the source world, None without annotation.
+
+    Objects that models_info.json lists but whose meshes are missing belong to no category.
+    """
+    rows = {i: truths[shot.sensor.truth_file][shot.key] for i, shot in enumerate(shots)
+            if shot.key in truths[shot.sensor.truth_file]}
+    if not rows:
         return None
     # All images of a scene describe the same objects; some datasets leave out the hidden ones.
-    best = max(annotated, key=lambda i: len(truths[keys[i]]))
+    best = max(rows, key=lambda i: len(rows[i]))
+    file = f'{shots[best].sensor.truth_file}: {shots[best].key}'
     result = []
-    for i, item in enumerate(fields.sequence(truths[keys[best]], f'{file}: {keys[best]}')):
-        where = f'{file}: {keys[best]}[{i}]'
+    for i, item in enumerate(fields.sequence(rows[best], file)):
+        where = f'{file}[{i}]'
         item = fields.mapping(item, where)
         obj_id = fields.required(item, 'obj_id', where)
+        if boxes.lacks_mesh(obj_id):
+            continue
         if not isinstance(obj_id, int) or obj_id not in categories:
             raise HoocError(f'{where} obj_id is {fields.short_repr(obj_id)}, but no file '
                             'models/obj_<6 digits>.ply has this id; add the model or correct the '
@@ -218,6 +201,11 @@ class _Boxes:
                  info: dict[str, Any]) -> None:
         self._categories, self._file, self._info = categories, info_file, info
         self._known: dict[int, tuple[Float64Array, Float64Array]] = {}
+
+    def lacks_mesh(self, obj_id: object) -> bool:
+        """Return whether models_info.json lists an object that has no mesh."""
+        return (isinstance(obj_id, int) and obj_id not in self._categories
+                and str(obj_id) in self._info)
 
     def of(self, obj_id: int) -> tuple[Float64Array, Float64Array]:
         """Return (centre (3,), size (3,)) in metres."""

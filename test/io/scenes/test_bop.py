@@ -189,7 +189,7 @@ def test_models_and_cameras_alone(dataset):
 
 
 def test_many_views_are_thinned(dataset, monkeypatch):
-    monkeypatch.setattr('hooc_perception.io.scenes.bop.MAX_VIEWS', 1)
+    monkeypatch.setattr('hooc_perception.io.scenes.bop_layout.MAX_VIEWS', 1)
     assert len(load_scene_set(dataset).scenes[0].cameras) == 1
 
 
@@ -232,4 +232,59 @@ def test_errors_name_file_and_field(dataset, name, change, words):
 def test_missing_image(dataset):
     (dataset / 'test' / '000002' / 'depth' / '000004.png').unlink()
     with pytest.raises(HoocError, match=r'000004\.png.*missing'):
+        load_scene_set(dataset)
+
+
+def several_sensors(dataset, posed=True):
+    """Make scene 2 one of two sensors that took image 4 at once, and of one without depth."""
+    folder = dataset / 'test' / '000002'
+    files = {name: json.loads((folder / f'scene_{name}.json').read_text())
+             for name in ('camera', 'gt')}
+    for sensor, image in (('cam1', '1'), ('realsense', '4')):
+        (folder / f'depth_{sensor}').mkdir()
+        (folder / 'depth' / f'{int(image):06d}.png').rename(
+            folder / f'depth_{sensor}' / '000004.png')
+        for name, content in files.items():
+            entry = content[image]
+            if name == 'camera' and not posed:
+                entry = {k: v for k, v in entry.items() if 'w2c' not in k}
+            (folder / f'scene_{name}_{sensor}.json').write_text(json.dumps({'4': entry}))
+    (folder / 'scene_camera_grey.json').write_text('{}')
+    for name in ('depth', 'scene_camera.json', 'scene_gt.json'):
+        (folder / name).rename(folder / f'old_{name}')
+    return dataset
+
+
+def test_images_that_several_sensors_took_at_once_are_one_scene(dataset):
+    before = load_scene_set(dataset).scenes[0]
+    several, single = load_scene_set(several_sensors(dataset)).scenes
+    assert (several.name, single.name) == ('000002_000004', '000005_000001')
+    assert [c.name for c in several.cameras] == ['cam1', 'realsense']
+    assert len(several.depth()) == 2 and len(several.truth) == 2
+    for camera, known in zip(several.source_cameras, before.source_cameras):
+        np.testing.assert_array_equal(camera.T_world_camera, known.T_world_camera)
+    assert [c.name for c in load_scene_set(dataset, with_scenes=False).cameras] == [
+        'cam1', 'realsense']
+
+
+def test_sensors_without_poses_give_scenes_of_their_own(dataset):
+    names = [s.name for s in load_scene_set(several_sensors(dataset, posed=False)).scenes]
+    assert names == ['000002_000004_cam1', '000002_000004_realsense', '000005_000001']
+
+
+def test_a_scene_without_any_depth_is_refused(dataset):
+    several_sensors(dataset)
+    for sensor in ('cam1', 'realsense'):
+        (dataset / 'test' / '000002' / f'depth_{sensor}').rename(dataset / f'depth_{sensor}')
+    with pytest.raises(HoocError, match='no sensor has depth images .*depth_cam1.*; add'):
+        load_scene_set(dataset)
+
+
+def test_objects_whose_mesh_is_missing_belong_to_no_category(dataset):
+    (dataset / 'models' / 'obj_000003.ply').unlink()
+    loaded = load_scene_set(dataset)
+    assert [true.category for true in loaded.scenes[0].truth] == ['tall_box']
+    info = dataset / 'models' / 'models_info.json'
+    info.write_text(json.dumps({'7': json.loads(info.read_text())['7']}))
+    with pytest.raises(HoocError, match='obj_id is 3'):
         load_scene_set(dataset)

@@ -26,8 +26,9 @@ EXPLAINED = {'stale': 'its stamp is too old by the clock of this node (wrong clo
              'out_of_order': 'it is older than the one before',
              'duplicate': 'its stamp has been seen already',
              'time_jump': 'time was set back, so all waiting frames are dropped',
-             'spread': 'it is too far in time from the frames of the other cameras '
-                       '(max_set_spread_s)'}
+             'spread': 'it is too far in time from the frames of the other cameras; '
+                       'max_set_spread_s must be at least the frame period of cameras that are '
+                       'not triggered together'}
 SILENT, APART = 'silent', 'apart'
 
 

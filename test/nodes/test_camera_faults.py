@@ -350,3 +350,31 @@ def test_infos_are_not_needed_with_every_image(bench):
         bench.rest(0.05)
     assert bench.spin(lambda: len(heard['a']) >= 3)
     assert isinstance(node.work.inputs[0]._last_info, CameraInfo)
+
+
+def test_frames_that_are_passed_over_are_reported_only_while_no_set_comes_together(bench):
+    node, raw, heard = start(bench, 'a', 'b', camera_timeout_s=0.0)
+    standing(bench, raw)
+
+    def send(*offsets_ms):
+        """Send images of a, b, a, ... at these times."""
+        for i, offset in enumerate(offsets_ms):
+            stamp = S + offset * 10 ** 6
+            raw[i % 2].send(stamp)
+            # Topics overtake each other: the next one is sent when this one has arrived.
+            last = node.work.assembly.sets._last_stamp
+            assert bench.spin(lambda: last.get('ab'[i % 2]) == stamp)
+
+    def dropped():
+        return sum(n for (_, reason), n in node.work.assembly.sets.drops.items()
+                   if reason == 'spread')
+
+    for cycle in range(12):
+        send(*(1000 * cycle + ms for ms in (0, 120, 200)))      # 5 Hz, 120 ms apart
+        assert bench.spin(lambda: len(heard['a']) == cycle + 1)
+    assert dropped() == 12
+    assert 'spread' not in {code for _, code in node.diagnostics._logged}
+    send(*(20_000 + 120 * i for i in range(20)))
+    assert dropped() > 22
+    assert 'spread' in {code for _, code in node.diagnostics._logged}
+    assert 'max_set_spread_s' in ' '.join(bench.reasons(node)[name][1] for name in 'ab')

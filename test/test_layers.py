@@ -52,6 +52,7 @@ ALLOWED = {
                   'hooc_perception.trained', 'hooc_perception.synthesis',
                   'hooc_perception.parser'},
     'experiments': {'numpy', 'hooc_perception.evaluation', 'hooc_perception.io.scenes'},
+    'calibration': {'numpy', 'scipy', 'matplotlib', 'hooc_perception.core', 'hooc_perception.io'},
     'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.io', 'hooc_perception.extras',
                   'hooc_perception.trained'},
     'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',

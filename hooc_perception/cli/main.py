@@ -38,6 +38,7 @@ COMMANDS = {
     'report': 'write results as one self-contained HTML page with overlays',
     'twin': 'write a synthetic benchmark set',
     'doctor': 'diagnose an installation or a bag and suggest fixes',
+    'calibrate': 'refine the poses of fixed cameras against each other and the table',
     'bench': 'measure speed and memory; fuzz and soak tests',
 }
 # The sub-command that runs where a command has several and none is named.

@@ -12,7 +12,9 @@ import numpy as np
 
 # Distances within which a point looks for another surface, from coarse to fine, metres.
 REACHES_M = (0.04, 0.02, 0.01, 0.01)
-MOST_STEPS, LEAST_STEP = 12, 2e-5
+MOST_STEPS = 10
+# Smaller steps end the work with a reach, metres and radians; a coarse reach needs less.
+LEAST_STEP, LEAST_COARSE_STEP = 2e-5, 3e-4
 # The table is looked for within this height of z = 0, metres.
 TABLE_BAND_M = 0.015
 
@@ -30,7 +32,8 @@ def refine(surfaces: Sequence[Sequence[Surface]],
     poses = [T.copy() for T in poses]
     free = np.ones((len(poses), 6), bool)
     free[0] = [False, False, True, True, True, False]
-    for reach in REACHES_M:
+    for k, reach in enumerate(REACHES_M):
+        enough = LEAST_STEP if k == len(REACHES_M) - 1 else LEAST_COARSE_STEP
         for _ in range(MOST_STEPS):
             normal = Normal(np.array([T[:3, 3] for T in poses]))
             for i, j, m in pair_matches(surfaces, poses, reach):
@@ -41,7 +44,7 @@ def refine(surfaces: Sequence[Sequence[Surface]],
                 normal.add(points, up, points[:, 2], i)
             twists = normal.step(free)
             poses = [moved(T, twist) for T, twist in zip(poses, twists)]
-            if np.abs(twists).max() < LEAST_STEP:
+            if np.abs(twists).max() < enough:
                 break
     return poses
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hooc_perception.core.arrays import Float64Array
-from hooc_perception.core.extrinsics.solve import moved, Normal, undetermined
+from hooc_perception.core.extrinsics.solve import moved, Normal, open_motions
 from hooc_perception.core.extrinsics.surface import Matches, matches, Surface, surface_of
 from hooc_perception.core.types import Observation
 import numpy as np
@@ -14,6 +14,8 @@ import numpy as np
 # Distances within which a point looks for the other surface, from coarse to fine, metres.
 REACHES_M = (0.06, 0.03, 0.015, 0.01, 0.01)
 STEPS_PER_REACH = 4
+# Smaller steps end the work with a reach, metres and radians.
+LEAST_STEP = 5e-5
 # Fewer common points than this say nothing.
 FEWEST_POINTS = 200
 # A point agrees with a surface that is nearer than this; of two that match, most do.
@@ -85,7 +87,8 @@ def pair_residuals(observation: Observation) -> list[PairResidual]:
 
 
 def pair_residual(names: tuple[str, str], scenes: Sequence[tuple[Surface, Surface]],
-                  T_world_a: Float64Array, T_world_b: Float64Array) -> PairResidual:
+                  T_world_a: Float64Array, T_world_b: Float64Array,
+                  start: Float64Array | None = None) -> PairResidual:
     """
     Return the disagreement of two fixed cameras over one or more scenes.
 
@@ -93,25 +96,26 @@ def pair_residual(names: tuple[str, str], scenes: Sequence[tuple[Surface, Surfac
     fine; the motion that this takes is the residual.
 
     :param scenes: the Surfaces of both cameras, per scene.
+    :param start: pose (4, 4) of the second camera to start from, where a better one is known.
     """
-    T = T_world_b
-    now = _both_ways(scenes, T_world_a, T, REACHES_M[1])
+    T = T_world_b if start is None else start
+    now = _both_ways(scenes, T_world_a, T_world_b, REACHES_M[1])
     surface_m = _median(now)
     for reach in REACHES_M:
         for _ in range(STEPS_PER_REACH):
             found = _both_ways(scenes, T_world_a, T, reach)
             if sum(len(m.points) for _, _, m in found) < FEWEST_POINTS:
                 break
-            known = undetermined(2, found) is None
+            known = not len(open_motions(2, found))
             twist = _step(found, np.stack([T_world_a[:3, 3], T[:3, 3]]), known)
             T = moved(T, twist)
-            if np.abs(twist).max() < 1e-5:
+            if np.abs(twist).max() < LEAST_STEP:
                 break
     found = _both_ways(scenes, T_world_a, T, AGREE_M)
     points = sum(len(m.points) for _, _, m in found)
     comparable = sum(m.comparable for _, _, m in found)
     agreement = points / comparable if comparable >= FEWEST_POINTS else np.nan
-    known = undetermined(2, found) is None
+    known = not len(open_motions(2, found))
     if points < FEWEST_POINTS or agreement < LEAST_AGREEMENT:
         return PairResidual(names, np.nan, np.nan, surface_m, float(agreement), points, known)
     shift, turn = _motion(T @ np.linalg.inv(T_world_b), found)

@@ -88,10 +88,9 @@ def moved(T_world_camera: Float64Array, twist: Float64Array) -> Float64Array:
     return T
 
 
-def undetermined(cameras: int, found: Sequence[tuple[int, int, Matches]],
-                 ) -> tuple[float, Float64Array] | None:
+def open_motions(cameras: int, found: Sequence[tuple[int, int, Matches]]) -> Float64Array:
     """
-    Return what the sloping surfaces leave open of the cameras' places on the table.
+    Return how the cameras can move on the table without the sloping surfaces changing.
 
     Height, roll and pitch of a camera follow from the table. What is left is its place (x, y)
     and its turn about the vertical; a plane lets it slide and turn freely, a cylinder lets it
@@ -99,8 +98,8 @@ def undetermined(cameras: int, found: Sequence[tuple[int, int, Matches]],
 
     :param cameras: their number; the first one is held.
     :param found: (camera, other, Matches) of every compared pair.
-    :return: None where all is determined; otherwise the information of the weakest direction
-        and (N, 3) the motion (x, y, turn times LEVER_M) of the cameras along it, of length 1.
+    :return: (k, N, 3) motions (x, y, turn times LEVER_M) of length 1; k = 0 where the surfaces
+        determine everything.
     """
     pairs = [(i, j, m.points[m.sloping], m.normals[m.sloping]) for i, j, m in found]
     points = np.concatenate([np.zeros((0, 3)), *(p for _, _, p, _ in pairs)])
@@ -113,9 +112,10 @@ def undetermined(cameras: int, found: Sequence[tuple[int, int, Matches]],
         block = J.T @ J
         for a, b, sign in ((i, i, 1), (j, j, 1), (i, j, -1), (j, i, -1)):
             H[3 * a:3 * a + 3, 3 * b:3 * b + 3] += sign * block
+    if cameras < 2:
+        return np.zeros((0, cameras, 3))
     values, vectors = np.linalg.eigh(H[3:, 3:])
-    if values[0] >= max(LEAST_INFORMATION, LEAST_SHARE * len(points)):
-        return None
-    motion: AnyArray = np.zeros((cameras, 3))
-    motion[1:] = vectors[:, 0].reshape(-1, 3)
-    return float(values[0]), motion
+    weak = values < max(LEAST_INFORMATION, LEAST_SHARE * len(points))
+    motions = np.zeros((int(weak.sum()), cameras, 3))
+    motions[:, 1:] = vectors[:, weak].T.reshape(-1, cameras - 1, 3)
+    return motions

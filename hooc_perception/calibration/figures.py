@@ -29,8 +29,9 @@ def as_text(result: Calibration) -> Iterator[str]:
         if result.held_out else 'the frame sets that the poses were fitted to')
     rows = [('camera', 'moved by', 'off the table before', f'after ({after})',
              'difference of two halves')]
-    rows += [(f.name, str(f.moved), str(f.table_before), str(f.table_after), str(f.spread))
-             for f in result.figures]
+    rows += [(f.name, str(f.moved), str(f.table_before), str(f.table_after),
+              'reference' if k == 0 and len(result.figures) > 1 else str(f.spread))
+             for k, f in enumerate(result.figures)]
     yield from _table(rows)
     if result.pairs:
         yield ''

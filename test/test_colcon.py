@@ -8,6 +8,8 @@ import shutil
 import subprocess
 import sys
 
+from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.trained.folder import load_model_folder
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -64,6 +66,25 @@ def test_installed_package_is_complete(workspace):
     wanted = {path.relative_to(source) for path in source.rglob('*') if path.is_file()}
     found = {path.relative_to(installed) for path in installed.rglob('*')}
     assert not {str(path) for path in wanted - found}
+
+
+def test_executables_start_with_the_python_that_built(workspace):
+    """A virtual environment next to ROS counts on it, see docs/installation.md."""
+    for node in (*NODES, 'hooc'):
+        text = (workspace / 'install/hooc_perception/lib/hooc_perception' / node).read_text()
+        python = Path(text.partition('\n')[0].removeprefix('#!'))
+        assert python.parent.resolve() == Path(sys.executable).parent.resolve()
+
+
+def test_a_build_of_links_has_executables_and_the_bundle(workspace):
+    call([sys.executable, '-m', 'colcon', 'build', '--symlink-install', '--build-base', 'linking',
+          '--install-base', 'linked'], workspace)
+    prefix = workspace / 'linked/hooc_perception'
+    assert all(os.access(prefix / 'lib/hooc_perception' / node, os.X_OK) for node in NODES)
+    share = prefix / 'share/hooc_perception'
+    assert (share / 'models/demo/model.json').is_symlink()
+    assert len(load_model_folder(share / 'models/demo').models) >= 5
+    assert BagScene(share / 'bags/demo').depth_topics
 
 
 def test_installed_command_runs(workspace):

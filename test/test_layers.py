@@ -54,7 +54,7 @@ ALLOWED = {
     'experiments': {'numpy', 'hooc_perception.evaluation', 'hooc_perception.io.scenes'},
     'calibration': {'numpy', 'scipy', 'matplotlib', 'hooc_perception.core', 'hooc_perception.io'},
     'diagnosis': {'numpy', 'hooc_perception.core', 'hooc_perception.io', 'hooc_perception.extras',
-                  'hooc_perception.trained'},
+                  'hooc_perception.objects', 'hooc_perception.trained'},
     'supervisor': {'numpy', 'yaml', 'rclpy', 'psutil', 'tqdm', 'hooc_perception.core',
                    'hooc_perception.ros', 'hooc_perception.nodes',
                    'hooc_perception.trained', 'hooc_perception.io'},

@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""`hooc doctor`: diagnoses an installation or a bag and suggests fixes."""
+"""`hooc doctor`: diagnoses an installation, a bag or a scene set and suggests fixes."""
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable
@@ -12,16 +12,18 @@ from hooc_perception.errors import HoocError
 if TYPE_CHECKING:
     from hooc_perception.diagnosis.finding import Finding
 
-HELP = ('Diagnose this installation or the given bags. Every finding is one sentence that says '
-        'what is wrong and how to fix it. The exit code is 1 if something will not work.')
+HELP = ('Diagnose this installation, or the given bags and scene sets. Every finding is one '
+        'sentence that says what is wrong and how to fix it. The exit code is 1 if something will '
+        'not work.')
 
 
 def add_arguments(parser: ArgumentParser) -> None:
     """Declare the arguments."""
-    parser.add_argument('bags', metavar='BAG', nargs='*', type=Path,
-                        help='bag to check: a rosbag2 folder, or an .mcap, .db3 or .bag file')
+    parser.add_argument('bags', metavar='BAG|SET', nargs='*', type=Path,
+                        help='what to check: a bag (a rosbag2 folder, or an .mcap, .db3 or .bag '
+                        'file), a scene set or a BOP dataset')
     parser.add_argument('--model', type=Path, metavar='MODEL',
-                        help='also check whether this model fits the cameras of the bags')
+                        help='also check whether this model fits the cameras of the bags or sets')
     parser.add_argument('--salvage', type=Path, metavar='NEW_BAG',
                         help='recover the readable part of one damaged bag into a new bag and '
                         'check that')
@@ -34,19 +36,22 @@ def run(args: Namespace) -> int:
     if args.salvage and len(args.bags) != 1:
         raise HoocError('--salvage recovers exactly one bag; name one')
     if args.model and not args.bags:
-        raise HoocError('--model is checked against bags; name at least one')
+        raise HoocError('--model is checked against bags and sets; name at least one')
     if args.salvage:
         args.bags = [_salvage(args.bags[0], args.salvage)]
     if args.bags:
         from hooc_perception.diagnosis.bag import check_bag
         from hooc_perception.diagnosis.geometry import check_rig
+        from hooc_perception.diagnosis.scene_set import check_set, check_set_rig, is_set
         from hooc_perception.trained.folder import load_model_folder
         model = load_model_folder(args.model) if args.model else None
         for path in args.bags:
             print(path)
-            findings += _show(check_bag(path))
+            check, check_fit = (check_set, check_set_rig) if is_set(path) else (
+                check_bag, check_rig)
+            findings += _show(check(path))
             if model:
-                findings += _show(check_rig(path, model))
+                findings += _show(check_fit(path, model))
     else:
         from hooc_perception.diagnosis.installation import check_installation
         findings = _show(check_installation())

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Check the camera poses of a bag against its table and against a model."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -34,11 +34,16 @@ def check_rig(path: Path, model: 'ModelFolder') -> Iterator[Finding]:
         cameras = BagScene(path).cameras
     except HoocError:
         return      # check_bag reports it
+    yield rig_finding(cameras, model)
+
+
+def rig_finding(cameras: Sequence[Camera], model: 'ModelFolder') -> Finding:
+    """Return whether cameras are those that a model was trained for."""
     kind = model.classifier.get('kind')
     view_bound = kind is not None and np.array_equal(kind, KIND_PAPER)
     trouble = rig_trouble(cameras, model.cameras) if view_bound else None
-    yield Finding(WARNING if trouble else OK, 'model',
-                  trouble or f'{model.name} can be used with these {len(cameras)} cameras')
+    return Finding(WARNING if trouble else OK, 'model',
+                   trouble or f'{model.name} can be used with these {len(cameras)} cameras')
 
 
 def check_geometry(path: Path, config: ObserveConfig = ObserveConfig()) -> Iterator[Finding]:

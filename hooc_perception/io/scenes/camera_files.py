@@ -13,28 +13,54 @@ from hooc_perception.core.segment.lens_checks import distortion_trouble, scale_t
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import fields, files
+from hooc_perception.io.scenes.camera_info_file import from_camera_info, is_camera_info, OWN_KEYS
 import numpy as np
 import yaml
 
 # Allowed numbers of coefficients per distortion model; shorter ones are padded with zeros.
 COEFFICIENTS = {'plumb_bob': (4, 5), 'rational_polynomial': (8,)}
 # `sensor` names the kind of the camera, such as kinect_v2; nobody reads it yet.
-KEYS = ('width', 'height', 'distortion_model', 'K', 'D', 'world_from_camera', 'sensor')
+KEYS = ('width', 'height', 'distortion_model', 'K', 'D', *OWN_KEYS)
 # Quaternions rounded to three decimals pass; quaternions that were never normalised do not.
 QUATERNION_TOLERANCE = 1e-3
 
 
-def load_cameras(path: str | Path) -> dict[str, Camera]:
+def load_cameras(path: str | Path, posed: bool = True) -> dict[str, Camera]:
     """
     Return {name: Camera} of a cameras.yaml, in the file's order.
 
+    An entry may also have the form of a ROS calibration file or CameraInfo message, or name such
+    a file under `camera_info`; a file that is one describes a single camera.
+
+    :param posed: False accepts cameras without world_from_camera, at the origin of their world.
     :raises HoocError: one sentence that names file, camera and field.
     """
+    path = Path(path)
     entries = files.read_yaml(path)
     if not entries:
         raise HoocError(f'{path}: no camera is described; add one entry per camera')
-    return {fields.ros_token(key, f'{path}: a camera name'): _camera(key, entry, f'{path}: {key}:')
+    if is_camera_info(entries):
+        name = str(entries.get('camera_name') or 'camera').strip('/').replace('/', '_')
+        entries = {name: entries}
+    return {fields.ros_token(key, f'{path}: a camera name'):
+            _camera(key, _entry(entry, path, f'{path}: {key}:'), f'{path}: {key}:', posed)
             for key, entry in entries.items()}
+
+
+def _entry(entry: object, path: Path, where: str) -> dict[str, Any]:
+    """Return an entry in our own form."""
+    entry = fields.mapping(entry, where)
+    if 'camera_info' in entry:
+        fields.closed(entry, ('camera_info', *OWN_KEYS), where)
+        file = files.file_inside(path.parent, entry['camera_info'], f'{where} camera_info')
+        info = files.read_yaml(file)
+        if not is_camera_info(info):
+            raise HoocError(f'{file}: neither a calibration file (camera_matrix, image_width) nor '
+                            'a CameraInfo message (k, d); correct camera_info')
+        return {**from_camera_info(info, f'{file}:'),
+                **{key: entry[key] for key in OWN_KEYS if key in entry}}
+    return from_camera_info(entry, where) if is_camera_info(entry) else fields.closed(
+        entry, KEYS, where)
 
 
 def write_cameras(path: str | Path, cameras: Iterable[Camera]) -> None:
@@ -105,20 +131,22 @@ def distortion(value: object, model: Any, where: str) -> Float64Array:
     return np.pad(D, (0, COEFFICIENTS[model][-1] - len(D)))
 
 
-def _camera(name: str, entry: object, where: str) -> Camera:
-    """Return the Camera of one entry of cameras.yaml."""
-    entry = fields.closed(fields.mapping(entry, where), KEYS, where)
+def _camera(name: str, entry: dict[str, Any], where: str, posed: bool) -> Camera:
+    """Return the Camera of one entry."""
     width, height = (fields.integer(fields.required(entry, side, where), 1, fields.MAX_SIDE,
                                     f'{where} {side}') for side in ('width', 'height'))
     model = entry.get('distortion_model', 'plumb_bob')
-    placed = fields.mapping(fields.required(entry, 'world_from_camera', where),
-                            f'{where} world_from_camera:')
-    fields.closed(placed, ('translation', 'rotation_xyzw'), f'{where} world_from_camera:')
-    translation, quaternion = pose(placed, f'{where} world_from_camera:')
-    camera = Camera(name, width, height,
-                    intrinsics(fields.required(entry, 'K', where), width, height, f'{where} K'),
-                    distortion(entry.get('D', []), model, where),
-                    matrix_from_pose(translation, quaternion), model)
+    K = intrinsics(fields.required(entry, 'K', where), width, height, f'{where} K')
+    D = distortion(entry.get('D', []), model, where)
+    T_world_camera = np.eye(4)
+    if posed or 'world_from_camera' in entry:
+        if 'world_from_camera' not in entry:
+            raise HoocError(f'{where} world_from_camera is missing; add it ({{translation: [x, y, '
+                            'z], rotation_xyzw: [x, y, z, w]}), for a calibration has no pose')
+        placed = fields.mapping(entry['world_from_camera'], f'{where} world_from_camera:')
+        fields.closed(placed, ('translation', 'rotation_xyzw'), f'{where} world_from_camera:')
+        T_world_camera = matrix_from_pose(*pose(placed, f'{where} world_from_camera:'))
+    camera = Camera(name, width, height, K, D, T_world_camera, model)
     if trouble := distortion_trouble(camera):
         raise HoocError(f'{where} has {trouble}')
     return camera

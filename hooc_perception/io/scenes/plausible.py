@@ -12,11 +12,10 @@ from hooc_perception.core.segment.rectify import undistorted
 from hooc_perception.core.segment.table_sight import depth_factor, table_sight
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
-from hooc_perception.io.depth_units import NEAREST_M
 import numpy as np
 
-# Beyond the range of any depth camera that looks at a table.
-FARTHEST_M = 30.0
+# Nearer and beyond the range of any depth camera that looks at a table.
+NEAREST_M, FARTHEST_M = 0.05, 30.0
 
 
 def check_aim(cameras: Iterable[Camera], where: str | Path) -> None:

@@ -108,8 +108,10 @@ def _load_hooc(path: Path, with_scenes: bool) -> SceneSet:
     limit = fields.integer(entry.get('max_instances_per_category', 0), 0, 1000,
                            f'{file}: max_instances_per_category')
     known = path / 'cameras.yaml'
-    set_cameras = camera_files.load_cameras(known) if known.is_file() else {}
     world = fields.name(entry.get('world_frame', 'table'), f'{file}: world_frame')
+    # Of a single camera, the unknown world may be its own frame.
+    posed = world != UNKNOWN_WORLD or len(camera_names) > 1
+    set_cameras = camera_files.load_cameras(known, posed) if known.is_file() else {}
     own = bool(set_cameras) and world != UNKNOWN_WORLD
     folders = _scene_folders(path, needed=with_scenes or not set_cameras)
     if with_scenes:

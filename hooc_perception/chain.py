@@ -68,6 +68,8 @@ TOPICS = {
     'objects/labels': Topic(1, True, PARSING),
     'objects/<category>/poses': Topic(1, True, PARSING),
     'objects/markers': Topic(1, True, PARSING),
+    'objects/unknown': Topic(1, True, PARSING),
+    'objects/unknown_attributes': Topic(1, True, PARSING),
     'objects/detections': Topic(1, True, PARSING),
     'scene/table': Topic(1, True, INGESTION),
     'scene/unexplained': Topic(1, True, PARSING),

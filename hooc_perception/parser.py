@@ -61,6 +61,8 @@ class Parser:
                  sigmas: bool = False) -> None:
         self.models, self.classifier, self.profile = tuple(models), classifier, profile
         self.max_instances, self.sigmas = max_instances, sigmas
+        # Whether the background class stands for things of no category as well.
+        self._strangers = bool(int(classifier.get('strangers', 0)))
         self._verifier = Verifier.from_arrays(classifier)
         self.method = profile.method(self._verifier)
         _check_classify(classifier, profile)
@@ -134,7 +136,8 @@ class Parser:
 
     def frame(self, observation: Observation, probabilities: PixelProbabilities) -> Frame:
         """Return what stages 3 and 4 take: observation, probabilities and models."""
-        return Frame(observation, probabilities, self.models)
+        weight = self.method.pixels.unknown_weight if self._strangers else 0.0
+        return Frame(observation, probabilities, self.models, weight)
 
     def propose(self, frame: Frame, seed: int = 0) -> Candidates:
         """Stage 3: pose candidates of every category."""
@@ -150,7 +153,8 @@ class Parser:
             parsed = replace(parsed, sigma_t=sigma_t, sigma_r=sigma_r).timed(
                 sigmas=time.monotonic() - start)
         parsed = replace(parsed, objects=canonical_objects(parsed.objects, self.models))
-        return self.method.calibrate(frame, parsed)
+        return self.method.open_world(frame, self.method.calibrate(frame, parsed),
+                                      self._strangers)
 
 
 class _Laps:

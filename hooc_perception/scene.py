@@ -53,17 +53,40 @@ class SceneObject:
 
 
 @dataclass(frozen=True)
+class UnknownObject:
+    """
+    Something of no category: an upright box.
+
+    :ivar translation: (3,) float64, centre of the box, world frame, metres.
+    :ivar rotation_xyzw: (4,) float64 unit quaternion, box axes to world.
+    :ivar size: (3,) float32, sides of the box along its axes, metres.
+    :ivar score: how sure the classifier is of something else here, 0 to 1; NaN where the model
+        was not trained among things of no category.
+    :ivar hull: (k, 3) float64 corners of the convex hull of what was seen of it and its shadow on
+        the bottom of the box, world frame, metres.
+    """
+
+    translation: Float64Array
+    rotation_xyzw: Float64Array
+    size: Float32Array
+    score: float
+    hull: Float64Array
+
+
+@dataclass(frozen=True)
 class Scene:
     """
     All objects that one frame set shows.
 
     :ivar objects: in no particular order.
+    :ivar unknown: things of no category that stand there as well.
     :ivar parsed: the same as arrays, with all candidates that were considered.
     :ivar observation: the rectified views that were parsed, with foreground and background.
     :ivar models: generic models of all categories.
     """
 
     objects: tuple[SceneObject, ...]
+    unknown: tuple[UnknownObject, ...]
     parsed: ParsedScene = field(repr=False)
     observation: Observation = field(repr=False)
     models: tuple[GenericModel, ...] = field(repr=False)
@@ -130,4 +153,7 @@ def scene_of(parsed: ParsedScene, observation: Observation, models: tuple[Generi
                     float(parsed.visible_ratio[k]), float(parsed.residual_m[k]),
                     float(parsed.energy_delta[k]), int(parsed.n_views[k]), float(sigma_t[k]),
                     float(sigma_r[k]), int(found.member[k]))
-        for k in range(len(found))), parsed, observation, models)
+        for k in range(len(found))), tuple(
+            UnknownObject(*row) for row in zip(
+                parsed.unknown.translation, parsed.unknown.rotation_xyzw, parsed.unknown.size,
+                parsed.unknown.score.tolist(), parsed.unknown.hulls)), parsed, observation, models)

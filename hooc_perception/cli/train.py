@@ -23,6 +23,9 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument('--relatives', action='store_true',
                         help='also train on shapes that only share the name with the meshes: the '
                         'families of the built-in catalogue, reshaped copies elsewhere')
+    parser.add_argument('--strangers', action='store_true',
+                        help='train among things of no category, so that categories are not '
+                        'forced on what the set does not know')
     parser.add_argument('--jobs', type=int, default=0, metavar='N',
                         help='parallel workers, 0 = all cores; does not change the model')
     options.add_executor(parser)
@@ -42,6 +45,6 @@ def run(args: Namespace) -> None:
     scene_set = load_scene_set(args.set, with_scenes=False)
     with executor(args.executor):
         folder = train(scene_set, args.out, args.profile, args.seed, jobs=args.jobs,
-                       configs=configs_of(args.profile, args.relatives))
+                       configs=configs_of(args.profile, args.relatives, args.strangers))
     print(f'{folder.path}: {len(folder.models)} categories, profile {folder.profile}, '
           f'{time.monotonic() - start:.0f} s')

@@ -249,6 +249,51 @@ class GenericModel:
 
 
 @dataclass(frozen=True)
+class UnknownObjects:
+    """
+    Things of no category, row by row: upright boxes.
+
+    :ivar translation: (n, 3) float64 centre of the box, metres.
+    :ivar rotation_xyzw: (n, 4) float64, box axes to world.
+    :ivar size: (n, 3) float32 sides of the box along its axes, metres.
+    :ivar score: (n,) float32, how sure the classifier is of something else, 0 to 1; NaN where it
+        was not trained among things of no category.
+    :ivar hulls: one (k, 3) float64 each, corners of the convex hull of what was seen, metres.
+    """
+
+    translation: Float64Array
+    rotation_xyzw: Float64Array
+    size: Float32Array
+    score: Float32Array
+    hulls: tuple[Float64Array, ...]
+
+    def __len__(self) -> int:
+        """Return the number of things."""
+        return len(self.translation)
+
+    @staticmethod
+    def empty() -> 'UnknownObjects':
+        """Return a set without members."""
+        return UnknownObjects(np.zeros((0, 3)), np.zeros((0, 4)), np.zeros((0, 3), np.float32),
+                              np.zeros(0, np.float32), ())
+
+    def take(self, index: 'AnyArray | list[int]') -> 'UnknownObjects':
+        """Return the rows that `index` (integers or bool mask) names."""
+        rows = np.arange(len(self))[index]
+        return UnknownObjects(self.translation[rows], self.rotation_xyzw[rows], self.size[rows],
+                              self.score[rows], tuple(self.hulls[k] for k in rows))
+
+    def moved(self, T_to_from: Float64Array | None) -> 'UnknownObjects':
+        """Return the same in another frame, by a rigid (4, 4); None = the same frame."""
+        if T_to_from is None or not len(self):
+            return self
+        R, t = T_to_from[:3, :3], T_to_from[:3, 3]
+        turn = Rotation.from_matrix(R) * Rotation.from_quat(self.rotation_xyzw)
+        return replace(self, translation=self.translation @ R.T + t, rotation_xyzw=turn.as_quat(),
+                       hulls=tuple(hull @ R.T + t for hull in self.hulls))
+
+
+@dataclass(frozen=True)
 class Energy:
     """The three terms of Eq. 1 and their sum (Basevi & Leonardis 2016)."""
 
@@ -277,6 +322,7 @@ class ParsedScene:
     :ivar pool: every candidate that was considered.
     :ivar sigma_t, sigma_r: (n,) float32, metres and radians within which 68 % of the errors lie,
         see core.parsing.uncertainty; NaN where that is not known, None where nobody asked.
+    :ivar unknown: things of no category, see core.parsing.unknown.
     :ivar converged: False where a deadline ended the search.
     :ivar seconds: wall time of each stage.
     """
@@ -292,11 +338,21 @@ class ParsedScene:
     seconds: dict[str, float] = field(default_factory=dict)
     sigma_t: Float32Array | None = None
     sigma_r: Float32Array | None = None
+    unknown: UnknownObjects = field(default_factory=UnknownObjects.empty)
+
+    def take(self, index: 'AnyArray') -> 'ParsedScene':
+        """Return the scene with those objects that a bool mask names; its energy stays."""
+        sigmas = (None if sigma is None else sigma[index]
+                  for sigma in (self.sigma_t, self.sigma_r))
+        return ParsedScene(
+            self.objects.take(index), self.energy, self.visible_ratio[index],
+            self.residual_m[index], self.energy_delta[index], self.n_views[index], self.pool,
+            self.converged, self.seconds, *sigmas, self.unknown)
 
     def moved(self, T_to_from: Float64Array | None) -> 'ParsedScene':
         """Return the same in another frame, by a rigid (4, 4); None = the same frame."""
         return replace(self, objects=self.objects.moved(T_to_from),
-                       pool=self.pool.moved(T_to_from))
+                       pool=self.pool.moved(T_to_from), unknown=self.unknown.moved(T_to_from))
 
     def timed(self, **seconds: float) -> 'ParsedScene':
         """Return a copy whose `seconds` also hold the given stages."""

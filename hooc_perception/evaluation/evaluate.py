@@ -14,6 +14,7 @@ from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.bop import bop_score, BopScene, BopScore
 from hooc_perception.evaluation.masks import MaskScore, score_masks
 from hooc_perception.evaluation.matching import in_frame_of, posed, PosedObject
+from hooc_perception.evaluation.open_world import open_score, OpenScore
 from hooc_perception.evaluation.scores import per_category, SceneScore, score_scene
 from hooc_perception.evaluation.shape import shape_errors, ShapeError
 from hooc_perception.evaluation.visibility import scene_visibility, Visibility
@@ -41,6 +42,7 @@ class Evaluation:
     :ivar energy: {scene: {total, depth, probability, overlap}} from the results.
     :ivar bop: None where it was not computed.
     :ivar shapes: {scene: errors of size and surface of its localized objects}.
+    :ivar open_world: of the scenes whose things of no category are known.
     """
 
     label: str
@@ -51,6 +53,7 @@ class Evaluation:
     energy: dict[str, dict[str, float | None]] = field(default_factory=dict)
     bop: BopScore | None = None
     shapes: dict[str, list[ShapeError]] = field(default_factory=dict)
+    open_world: tuple[OpenScore, ...] = ()
 
     def per_category(self, categories: Iterable[str]) -> dict[str, dict[str, Any]]:
         """Return `scores.per_category` of all scenes with poses."""
@@ -112,13 +115,14 @@ def evaluate_results(scene_set: SceneSet, results: Mapping[str, Any],
     :raises HoocError: where an estimate names a category that the set does not list.
     """
     by_name = {entry['scene']: entry for entry in results['scenes']}
-    scores, masks, targets = [], [], []
+    scores, masks, targets, opens = [], [], [], []
     estimates: dict[str, list[PosedObject]] = {}
     energy: dict[str, dict[str, float | None]] = {}
     shapes: dict[str, list[ShapeError]] = {}
     for scene in scene_set.scenes:
         entry = by_name.get(scene.name)
-        found = ([posed(o) for o in in_frame_of(scene, entry)['objects']] if entry else [])
+        here = in_frame_of(scene, entry) if entry else {'objects': []}
+        found = [posed(o) for o in here['objects']]
         for unknown in (o.category for o in found if o.category not in models):
             raise HoocError(f'scene {scene.name} of the results contains a {unknown!r}, '
                             f'which {scene_set.path} does not list; evaluate it against its set')
@@ -129,6 +133,10 @@ def evaluate_results(scene_set: SceneSet, results: Mapping[str, Any],
         if scene.truth is not None:
             truths = [posed(t) for t in scene.truth]
             scores.append(score_scene(scene.name, found, truths, models, **about))
+            if scene.strangers is not None:
+                opens.append(open_score(
+                    scene.name, found, [posed(u) for u in here.get('unknown') or []], truths,
+                    [posed(s) for s in scene.strangers], models))
             shapes[scene.name] = shape_errors(scores[-1], found, truths, models)
             if visibility and scene.name in visibility:
                 views = [rectify(view, RECTIFY) for view in scene.depth()]
@@ -138,7 +146,7 @@ def evaluate_results(scene_set: SceneSet, results: Mapping[str, Any],
             masks.append(_masks(scene, found, models, about))
     setting = str(results.get('setting', 'A')).upper()
     return Evaluation(label, setting, tuple(scores), tuple(masks), estimates, energy,
-                      bop_score(targets) if targets else None, shapes)
+                      bop_score(targets) if targets else None, shapes, tuple(opens))
 
 
 def _masks(scene: RecordedScene, found: list[PosedObject], models: Mapping[str, GenericModel],

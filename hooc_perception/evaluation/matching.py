@@ -92,13 +92,15 @@ def in_frame_of(scene: Any, entry: dict[str, Any]) -> dict[str, Any]:
     theirs = entry['world']['table_from_source']
     T_ours_theirs = scene.table.T_table_source @ inverse(
         matrix_from_pose(theirs['translation'], theirs['rotation_xyzw']))
-    objects = []
-    for thing in entry['objects']:
-        translation, rotation = pose_from_matrix(
-            T_ours_theirs @ matrix_from_pose(thing['translation'], thing['rotation_xyzw']))
-        objects.append(thing | {'translation': translation.tolist(),
-                                'rotation_xyzw': rotation.tolist()})
-    return entry | {'objects': objects, **scene.world}
+    moved = {}
+    for kind in ('objects', 'unknown'):
+        moved[kind] = []
+        for thing in entry.get(kind) or []:
+            translation, rotation = pose_from_matrix(
+                T_ours_theirs @ matrix_from_pose(thing['translation'], thing['rotation_xyzw']))
+            moved[kind].append(thing | {'translation': translation.tolist(),
+                                        'rotation_xyzw': rotation.tolist()})
+    return entry | moved | scene.world
 
 
 def match_by_centre(estimates: Sequence[PosedObject],

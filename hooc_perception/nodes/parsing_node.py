@@ -159,9 +159,10 @@ class Parsing:
         ids, objects = self._tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
         left = unexplained_points(observation.in_target_frame(), objects, self.models)
-        scene = detected_scene(parsed, ids, self.models, stamp_ns, frame)
+        scene = detected_scene(parsed, ids, self.models, stamp_ns, frame,
+                               self._tracker.update_unknown(stamp_ns, parsed.unknown))
         age_s = (node.now_ns() - stamp_ns) * 1e-9
-        self.output.publish(parsed, ids, stamp_ns, frame, age_s, left)
+        self.output.publish(parsed, scene, age_s, left)
         self._answered = time.monotonic()
         publish_all(node, self.adapters, scene)
         node.detect.answer(scene)

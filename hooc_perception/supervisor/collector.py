@@ -18,6 +18,7 @@ from hooc_perception.ros.messages.stages import (
     candidates_from_messages,
     probabilities_from_message,
 )
+from hooc_perception.ros.messages.unknown import unknown_from_messages
 from hooc_perception.ros.qos import qos
 from rclpy.node import Node
 from rclpy.subscription import Subscription
@@ -47,6 +48,7 @@ class FrameSetResult:
 _INGESTION = f'{INGESTION}: '
 _PARTS: dict[str, Any] = {
     'objects/poses': PoseArray, 'objects/attributes': PointCloud2, 'scene/summary': String,
+    'objects/unknown': PoseArray, 'objects/unknown_attributes': PointCloud2,
     'candidates/poses': PoseArray, 'candidates/attributes': PointCloud2,
     'pixels/probabilities': PointCloud2}
 # Of a message: rclpy's annotation of callbacks leaves it out.
@@ -174,10 +176,12 @@ class Collector:
 
     def result(self, stamp_ns: int) -> FrameSetResult | None:
         """Return the result of the frame set of a stamp, None while parts are missing."""
-        poses, attributes, summary = (self._parts[topic].get(stamp_ns) for topic in (
-            'objects/poses', 'objects/attributes', 'scene/summary'))
-        if poses is None or attributes is None or summary is None:
+        parts = [self._parts[topic].get(stamp_ns) for topic in (
+            'objects/poses', 'objects/attributes', 'scene/summary', 'objects/unknown',
+            'objects/unknown_attributes')]
+        if any(part is None for part in parts):
             return None
+        poses, attributes, summary, *unknown = parts
         found = candidates_from_messages(poses, attributes)
         rows = cloud_rows(attributes)
         pool = self._pool(stamp_ns)
@@ -188,7 +192,7 @@ class Collector:
             rows['visible_ratio'].copy(), rows['residual_m'].copy(), rows['energy_delta'].copy(),
             rows['n_views'].copy(), pool, converged=summary['converged'],
             seconds=summary['seconds'], sigma_t=rows['sigma_t'].copy(),
-            sigma_r=rows['sigma_r'].copy())
+            sigma_r=rows['sigma_r'].copy(), unknown=unknown_from_messages(*unknown))
         probabilities = self._parts['pixels/probabilities'].get(stamp_ns)
         arrived = max((t for s, t in self._arrived.items() if s >= stamp_ns), default=0)
         return FrameSetResult(

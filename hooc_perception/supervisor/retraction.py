@@ -8,7 +8,7 @@ from typing import Any
 from geometry_msgs.msg import PoseArray
 from hooc_perception.ros.outputs.adapters.detections import detections_message
 from hooc_perception.ros.outputs.detected import DetectedScene
-from hooc_perception.ros.outputs.object_output import empty_clouds, summary_json
+from hooc_perception.ros.outputs.object_output import empty_clouds, empty_unknown, summary_json
 from hooc_perception.ros.qos import qos
 from hooc_perception.supervisor.displayed import Displayed, optional_messages
 from rclpy.node import Node
@@ -36,6 +36,7 @@ class Retraction:
         self._detections = optional_messages('vision_msgs') if detections else None
         self._topics = {topic: self._publisher(kind, topic) for kind, topic in (
             (String, 'objects/labels'), (PointCloud2, 'objects/attributes'),
+            (PoseArray, 'objects/unknown'), (PointCloud2, 'objects/unknown_attributes'),
             (MarkerArray, 'objects/markers'), (PointCloud2, 'scene/unexplained'),
             (String, 'scene/summary'))}
         if self._detections:
@@ -61,6 +62,8 @@ class Retraction:
         attributes, unexplained = empty_clouds(head)
         messages = {
             'objects/attributes': attributes,
+            'objects/unknown_attributes': empty_unknown(head),
+            'objects/unknown': PoseArray(header=head),
             'objects/markers': self._markers_message(head),
             'scene/unexplained': unexplained,
             'scene/summary': String(data=summary_json(None, scene.stamp_ns))}

@@ -5,14 +5,19 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
+from hooc_perception.core.memo import latest
 from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.synthesis.bodies import Body, body_maker
 from hooc_perception.synthesis.pile import Pile, SettleConfig
 from hooc_perception.synthesis.population import Population
-from hooc_perception.synthesis.scatter import PlacedObject, ScatterConfig
+from hooc_perception.synthesis.scatter import models_key, PlacedObject, ScatterConfig
+from hooc_perception.synthesis.strangers import Strangers
 import numpy as np
 from scipy.spatial import ConvexHull
+
+# Of the numbers of strangers from -NO_STRANGERS to the most, those below one mean none.
+NO_STRANGERS = 2
 
 
 def settle(bodies: Sequence[Body], rng: np.random.Generator,
@@ -41,7 +46,7 @@ def settle(bodies: Sequence[Body], rng: np.random.Generator,
 def settled_models(models: Sequence[GenericModel], rng: np.random.Generator,
                    scatter: ScatterConfig, strength: float,
                    config: SettleConfig = SettleConfig(), population: Population = (),
-                   fold: int | None = None) -> list[PlacedObject]:
+                   fold: int | None = None, strangers: int = 0) -> list[PlacedObject]:
     """
     Return a settled arrangement of a random subset of models.
 
@@ -51,6 +56,7 @@ def settled_models(models: Sequence[GenericModel], rng: np.random.Generator,
     :param strength: how far the objects depart from the generic shapes.
     :param population: relatives of the models, from which objects are made as well.
     :param fold: make objects only from relatives of this fold, where there are any.
+    :param strangers: most things of no category among them; in some scenes there are none.
     :raises HoocError: if there are no models.
     """
     if not models:
@@ -60,7 +66,17 @@ def settled_models(models: Sequence[GenericModel], rng: np.random.Generator,
     count = int(rng.integers(scatter.objects_low, scatter.objects_high + 1))
     chosen = rng.permutation(np.tile(np.arange(len(models)), scatter.repeats))[:count] + 1
     bodies = [maker.body(int(c), rng, strength, fold=fold) for c in chosen]
+    if strangers:
+        stranger = strangers_beside(models)
+        bodies += [stranger.body(rng, strength)
+                   for _ in range(max(0, int(rng.integers(-NO_STRANGERS, strangers + 1))))]
     return settle(bodies, rng, varied(config, rng))
+
+
+@latest(4, key=models_key)
+def strangers_beside(models: Sequence[GenericModel]) -> Strangers:
+    """Return this process's Strangers to the models."""
+    return Strangers([model.name for model in models])
 
 
 def varied(config: SettleConfig, rng: np.random.Generator) -> SettleConfig:

@@ -48,6 +48,7 @@ class TrainingConfig(Config):
     calibration_m: float = param(0.0015, 'The same for its position, per axis.', 'm', 0.0, 0.2)
     randomise_sensor: bool = param(False, "Draw the sensor's parameters anew for every scene.")
     translucent: float = param(0.0, 'Share of objects that are translucent.', '', 0.0, 1.0)
+    strangers: int = param(0, 'Most things of no category per scene.', '', 0, 50)
     scatter: ScatterConfig = param(ScatterConfig(), 'How scattered scenes are drawn.')
     sensor: SensorConfig = param(SensorConfig(), 'The simulated sensor.')
     room: RoomConfig = param(RoomConfig(), 'Table and surroundings.')
@@ -190,4 +191,4 @@ def _settled(models: Sequence[GenericModel], rng: np.random.Generator,
     # Imported late: the paper's scenes do not need physics.
     from hooc_perception.synthesis.settle import settled_models
     return settled_models(models, rng, config.scatter, config.reshape_strength,
-                          population=population, fold=fold)
+                          population=population, fold=fold, strangers=config.strangers)

@@ -21,6 +21,7 @@ from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
 from hooc_perception.parser import Parser
 from hooc_perception.synthesis.population import FOLDS, Population
+from hooc_perception.synthesis.strangers import STRANGER
 from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
 from hooc_perception.training.context import Arrays, TrainingContext
 from hooc_perception.training.fit_forest import (
@@ -92,7 +93,7 @@ class _Scenes:
         search = method.search(frame, method.propose(frame, seed), seed, parser.max_instances)
         x = features(search)
         right = np.zeros(len(x), np.uint8)
-        for o in scene.objects:
+        for o in (o for o in scene.objects if o.category != STRANGER):
             reach = config.right_within * parser.models[o.category - 1].longest_side
             right |= ((search.pool.category == o.category)
                       & (np.linalg.norm(search.pool.translation - o.translation, axis=1) < reach))

@@ -58,6 +58,10 @@ class FusedScenesConfig(Config):
                                1.0)
     objects_low: int = param(8, 'Fewest objects per scene.', '', 1, 200)
     objects_high: int = param(20, 'Most objects per scene.', '', 1, 200)
+    strangers: int = param(0, 'Most things of no category per scene: random shapes, and members '
+                           'of families of the built-in catalogue that the set does not have. '
+                           'They are background to the classifier and wrong to the verifier.', '',
+                           0, 50)
     rows_sqrt: float = param(1.2, 'Pixels kept of a class with n foreground pixels in a scene: '
                              'this times sqrt(n). Large objects would outweigh small ones, and '
                              'more scenes help more than more pixels of each.', '', 0.1, 100.0)
@@ -91,7 +95,7 @@ def scene_config(config: FusedScenesConfig, repeats: int) -> TrainingConfig:
     """Return the TrainingConfig of a FusedScenesConfig, its rig still the given one."""
     return TrainingConfig(
         arrangement='settled', rig='jittered',
-        randomise_sensor=True, translucent=config.translucent,
+        randomise_sensor=True, translucent=config.translucent, strangers=config.strangers,
         scatter=ScatterConfig(objects_low=config.objects_low, objects_high=config.objects_high,
                               repeats=repeats, pose='resting'))
 

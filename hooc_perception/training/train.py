@@ -51,6 +51,10 @@ WITH_RELATIVES: dict[type[Config], dict[str, Any]] = {
     FitConfig: {'trees': 60}}
 
 
+# What changes where training scenes contain things of no category.
+WITH_STRANGERS: dict[type[Config], dict[str, Any]] = {FusedScenesConfig: {'strangers': 5}}
+
+
 class TrainedCategory(Protocol):
     """What training reads of a category, as io.scenes.scene.Category has it."""
 
@@ -135,20 +139,24 @@ def train(scene_set: TrainingSet, out: str | Path, profile: str = 'best', seed: 
                              scene_set.cameras, scene_set.max_instances)
 
 
-def configs_of(profile: str, relatives: bool = False) -> tuple[Config, ...]:
+def configs_of(profile: str, relatives: bool = False,
+               strangers: bool = False) -> tuple[Config, ...]:
     """
     Return the Config objects by which a profile is trained.
 
     :param relatives: whether objects are also made from the built-in catalogue's families.
-    :raises HoocError: where the profile knows no relatives.
+    :param strangers: whether scenes contain things of no category.
+    :raises HoocError: where the profile knows neither.
     """
     configs = PROFILES[profile]
-    if not relatives:
-        return configs
-    if not any(isinstance(c, FusedScenesConfig) for c in configs):
-        raise HoocError(f'profile {profile} is trained on the generic meshes alone; leave out '
-                        '--relatives or choose another profile')
-    return tuple(c.changed(WITH_RELATIVES.get(type(c), {})) for c in configs)
+    for wanted, option, changes in ((relatives, '--relatives', WITH_RELATIVES),
+                                    (strangers, '--strangers', WITH_STRANGERS)):
+        if wanted and not any(isinstance(c, FusedScenesConfig) for c in configs):
+            raise HoocError(f'profile {profile} is trained on the generic meshes alone; leave '
+                            f'out {option} or choose another profile')
+        if wanted:
+            configs = tuple(c.changed(changes.get(type(c), {})) for c in configs)
+    return configs
 
 
 def generic_models(scene_set: TrainingSet, seed: int,
@@ -226,8 +234,10 @@ def _fused(context: TrainingContext, scenes: FusedScenesConfig) -> Arrays:
                      stage_rng(context.seed, 'fused forest'), context.jobs, bar.update,
                      table.fold[kept])
     held_out = {'held_out_accuracy': _accuracy(forest, table, ~kept)}
-    return {**_head(context, KIND_FUSED, held_out), 'probes': table.probes,
-            **forest.arrays('forest_')}
+    arrays = {**_head(context, KIND_FUSED, held_out), 'probes': table.probes,
+              **forest.arrays('forest_')}
+    # The background class stands for things of no category as well.
+    return {**arrays, 'strangers': np.uint8(1)} if scenes.strangers else arrays
 
 
 def _accuracy(forest: Forest, table: FusedTable, rows: BoolArray) -> float | None:

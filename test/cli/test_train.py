@@ -26,6 +26,13 @@ def test_a_set_without_any_scene_can_be_trained_on(tmp_path, monkeypatch, capsys
     words = ['train', str(tmp_path / 'set'), '--out', str(tmp_path / 'm'), '--relatives']
     assert cli.main(words) == 0
     assert given['configs'][0].relatives and given['configs'][1].trees == 60
+    assert given['configs'][0].strangers == 0
+    words[-1] = '--strangers'
+    assert cli.main(words) == 0
+    assert given['configs'][0].strangers == 5 and given['configs'][1] == PROFILES['best'][1]
+    assert cli.main([*words, '--profile', 'paper']) == 1
+    assert 'leave out --strangers' in capsys.readouterr().err
+    words[-1] = '--relatives'
     assert cli.main([*words, '--profile', 'paper']) == 1
     assert 'leave out --relatives' in capsys.readouterr().err
 

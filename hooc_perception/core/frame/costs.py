@@ -24,6 +24,11 @@ class PixelCosts(Config):
     free_weight: float = param(0.7, 'Cost of a free-space violation: a surface was measured '
                                'behind the object.', '', 0.0, 2.0)
 
+    unknown_weight: float = param(0.6, 'Discount on an unexplained pixel where the classifier is '
+                                  'certain of something else, a thing of no category: a category '
+                                  'that explains it little better is not forced on it.', '', 0.0,
+                                  1.0)
+
     def weights(self) -> PixelWeights:
         """Return the same numbers as the kernels take them."""
         return PixelWeights(self.tolerance_m, self.normal_weight, self.category_weight,

@@ -54,19 +54,21 @@ class Evidence:
     """
 
     def __init__(self, observation: Observation, probabilities: PixelProbabilities,
-                 shapes: Shapes, cloud: Cloud, patch: Int32Array, stride: int = 1) -> None:
+                 shapes: Shapes, cloud: Cloud, patch: Int32Array, stride: int = 1,
+                 unknown_weight: float = 0.0) -> None:
         """
         Stack every `stride`-th row and column of all views.
 
         :param shapes: the meshes that hypotheses name.
         :param cloud: Cloud of the observation; `patch` (n,) labels of its points.
+        :param unknown_weight: PixelCosts.unknown_weight.
         """
         self.scale = 1.0 / (stride * stride)
         self.row = _stacked(cloud.row, stride)
         self.n_points = len(patch)
         self.views = _views_of(observation, probabilities, cloud, _labels(patch, self.row), stride)
         self.shapes, self.meshes = shapes, _meshes_of(shapes.models)
-        self.cost_none: Float32Array = self.views.foreground.astype(np.float32)
+        self.cost_none: Float32Array = _cost_of_nothing(self.views, unknown_weight)
         n = len(self.cost_none)
         far = np.full(n, np.inf, np.float32)
         self.nothing = Context(np.full(n, -2, np.int32), far, self.cost_none, far, self.cost_none)
@@ -158,6 +160,14 @@ def hypotheses_of(candidates: Candidates, shapes: Shapes) -> Float64Array:
 def _stacked(images: Sequence[AnyArray], stride: int) -> AnyArray:
     """Return (P, ...), every `stride`-th row and column of images (H, W, ...), stacked."""
     return np.concatenate([x[::stride, ::stride].reshape(-1, *x.shape[2:]) for x in images])
+
+
+def _cost_of_nothing(views: Views, unknown_weight: float) -> Float32Array:
+    """Return (P,) float32: what it costs to show no object, less where something else is."""
+    something_else = np.zeros(len(views.foreground), np.float32)
+    known = views.p_row >= 0
+    something_else[known] = views.p[views.p_row[known], 0] / np.float32(255)
+    return views.foreground * (1 - np.float32(unknown_weight) * something_else)
 
 
 def _labels(patch: Int32Array, row: AnyArray) -> AnyArray:

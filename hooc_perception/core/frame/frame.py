@@ -24,11 +24,13 @@ class Frame:
     :ivar observation: Observation of all views.
     :ivar probabilities: PixelProbabilities of the same views.
     :ivar models: generic models; class id c is models[c - 1].
+    :ivar unknown_weight: PixelCosts.unknown_weight.
     """
 
     observation: Observation
     probabilities: PixelProbabilities
     models: tuple[GenericModel, ...]
+    unknown_weight: float = 0.0
 
     @cached_property
     def cloud(self) -> Cloud:
@@ -67,4 +69,4 @@ class Frame:
 
     def _evidence(self, stride: int) -> Evidence:
         return Evidence(self.observation, self.probabilities, self.shapes, self.cloud,
-                        self.patch, stride)
+                        self.patch, stride, self.unknown_weight)

@@ -4,6 +4,7 @@
 
 from dataclasses import replace
 
+from hooc_perception.core.energy.eq1 import energy_of
 from hooc_perception.core.energy.local_search import SearchResult
 from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
 from hooc_perception.core.frame.frame import Frame
@@ -14,6 +15,7 @@ from hooc_perception.core.parsing.answer import Choice, parsed_scene
 from hooc_perception.core.parsing.calibration import calibrated_scores
 from hooc_perception.core.parsing.config import ParseConfig
 from hooc_perception.core.parsing.search import Search, search_scene
+from hooc_perception.core.parsing.unknown import find_unknown
 from hooc_perception.core.parsing.verifier import features, Verifier
 from hooc_perception.core.types import Candidates, ParsedScene
 import numpy as np
@@ -76,6 +78,25 @@ class JointMethod:
             return parsed
         score = calibrated_scores(parsed, frame.observation)
         return replace(parsed, objects=replace(parsed.objects, score=score))
+
+    def open_world(self, frame: Frame, parsed: ParsedScene, strangers: bool) -> ParsedScene:
+        """
+        Return the scene with the things of no category beside its objects.
+
+        Only a model that was trained among strangers can tell them from the rest of an object:
+        it rejects unlikely objects and things; otherwise the things have no score.
+        """
+        config = self._parse.open_world
+        if strangers and (parsed.objects.score < config.reject_below).any():
+            parsed = parsed.take(parsed.objects.score >= config.reject_below)
+            parsed = replace(parsed, energy=energy_of(frame.observation, frame.probabilities,
+                                                      parsed.objects, frame.models))
+        unknown = find_unknown(frame, parsed.objects)
+        if strangers:
+            unknown = unknown.take(unknown.score >= config.least_unknown_score)
+        else:
+            unknown = replace(unknown, score=np.full(len(unknown), np.nan, np.float32))
+        return replace(parsed, unknown=unknown)
 
     def _search(self, frame: Frame, pool: Candidates, seed: int, max_instances: int,
                 deadline: Deadline, rng: np.random.Generator,

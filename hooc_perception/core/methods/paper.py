@@ -38,7 +38,7 @@ class PaperMethod:
     """
 
     # The paper has no such costs: these only describe the result, in the units of the others.
-    pixels, objects = PixelCosts(), ObjectCosts()
+    pixels, objects = PixelCosts(unknown_weight=0.0), ObjectCosts()
 
     def __init__(self, propose: FragmentConfig = FragmentConfig(),
                  parse: PaperParseConfig = PaperParseConfig()) -> None:
@@ -63,4 +63,8 @@ class PaperMethod:
 
     def calibrate(self, frame: Frame, parsed: ParsedScene) -> ParsedScene:
         """Return the scene as it is: Eq. 1 is a mean over pixels and tells no probability."""
+        return parsed
+
+    def open_world(self, frame: Frame, parsed: ParsedScene, strangers: bool) -> ParsedScene:
+        """Return the scene as it is: the paper knows no things without a category."""
         return parsed

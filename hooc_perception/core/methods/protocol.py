@@ -45,6 +45,14 @@ class Method(Protocol):
         """Return the same objects with scores that are probabilities, where the method can."""
         ...
 
+    def open_world(self, frame: Frame, parsed: ParsedScene, strangers: bool) -> ParsedScene:
+        """
+        Return the scene with things of no category, where the method can tell them.
+
+        :param strangers: whether the classifier was trained among things of no category.
+        """
+        ...
+
 
 class Deadline:
     """

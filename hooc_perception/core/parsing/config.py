@@ -22,12 +22,23 @@ class VerdictConfig(Config):
 
 
 @dataclass(frozen=True)
+class OpenWorldConfig(Config):
+    """What a model that was trained among strangers makes of them; without effect for others."""
+
+    reject_below: float = param(0.3, 'An object whose score is below this is rejected: what it '
+                                'explained may be something of no category.', '', 0.0, 1.0)
+    least_unknown_score: float = param(0.1, 'Things of no category whose score is below this are '
+                                       'not reported: they are rather the rest of an object.',
+                                       '', 0.0, 1.0)
+
+
+@dataclass(frozen=True)
 class ParseConfig(Config):
     """
     Parameters of stage 4 of the joint method.
 
     :ivar search: of the discrete search; `pixels` and `objects` of the joint energy, `verdict`
-        of the verifier.
+        of the verifier, `open_world` of things of no category.
     """
 
     rounds: int = param(3, 'Rounds of refinement and re-proposal.', low=0)
@@ -46,3 +57,4 @@ class ParseConfig(Config):
     pixels: PixelCosts = group(PixelCosts())
     objects: ObjectCosts = group(ObjectCosts())
     verdict: VerdictConfig = group(VerdictConfig())
+    open_world: OpenWorldConfig = group(OpenWorldConfig())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from hooc_perception.core.arrays import Float64Array, UInt32Array
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.symmetry import canonical_objects, rotation_error
-from hooc_perception.core.types import Candidates, GenericModel
+from hooc_perception.core.types import Candidates, GenericModel, UnknownObjects
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
@@ -54,12 +54,14 @@ class Tracker:
                  config: TrackConfig = TrackConfig()) -> None:
         self.models, self.config = models, config
         self._tracks: dict[int, _Track] = {}
+        # Id -> (translation, stamp in ns) of things of no category.
+        self._things: dict[int, tuple[Float64Array, int]] = {}
         self._next_id = 1
         self._last_ns: int | None = None
 
     def forget(self) -> None:
         """Forget all objects; their ids are not used again."""
-        self._tracks, self._last_ns = {}, None
+        self._tracks, self._things, self._last_ns = {}, {}, None
 
     def update(self, stamp_ns: int, objects: Candidates) -> tuple[UInt32Array, Candidates]:
         """
@@ -89,6 +91,29 @@ class Tracker:
                 int(objects.category[row]), objects.translation[row],
                 Rotation.from_quat(objects.rotation_xyzw[row]).as_matrix(), stamp_ns)
         return ids, objects
+
+    def update_unknown(self, stamp_ns: int, unknown: UnknownObjects) -> UInt32Array:
+        """
+        Return ids (n,) uint32 of the things of no category, after `update` of the same stamp.
+
+        They are matched by where they are; ids are unlike those of known objects.
+        """
+        self._things = {number: thing for number, thing in self._things.items()
+                        if stamp_ns - thing[1] <= self.config.track_ttl_s * 1e9}
+        ids = np.zeros(len(unknown), np.uint32)
+        if len(unknown) and self._things:
+            numbers, known = list(self._things), [thing[0] for thing in self._things.values()]
+            way = np.linalg.norm(unknown.translation[:, None] - np.array(known)[None], axis=2)
+            far = way > self.config.track_reach_m
+            for i, j in zip(*linear_sum_assignment(np.where(far, 1 + way[~far].sum(), way))):
+                if not far[i, j]:
+                    ids[i] = numbers[j]
+        for row in np.flatnonzero(ids == 0):
+            ids[row] = self._next_id
+            self._next_id += 1
+        for number, translation in zip(ids.tolist(), unknown.translation):
+            self._things[number] = translation, stamp_ns
+        return ids
 
     def _matches(self, objects: Candidates) -> Iterator[tuple[int, int]]:
         """Yield (row, id) of the objects that are known already."""

@@ -9,20 +9,23 @@ from typing import Any
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.pictures import Palette
 from hooc_perception.evaluation.report.rows import missed_rows, object_rows, rejected_rows
-from hooc_perception.evaluation.report.scene import ReportScene, ShownScene
+from hooc_perception.evaluation.report.scene import ReportScene, ShownScene, UNKNOWN
 from hooc_perception.evaluation.report.space import Meshes, space_json
 from hooc_perception.evaluation.report.views import shaded_pictures, view_pictures
 from hooc_perception.io.scenes.files import write_atomically
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
+# Of things of no category.
+GREY = (150, 150, 150)
 TERMS = ('depth', 'probability', 'overlap')
 
 
 def palette_of(scenes: Iterable[ReportScene]) -> Palette:
     """Return {category: (r, g, b)} of all categories in the scenes."""
-    return pictures.colours(sorted({c for s in scenes for c in (
-        *s.models, *(o.category for o in (*s.objects, *(s.truth or ()))))}))
+    names = {c for s in scenes for c in (
+        *s.models, *(o.category for o in (*s.objects, *(s.truth or ()))))}
+    return {**pictures.colours(sorted(names - {UNKNOWN})), UNKNOWN: GREY}
 
 
 def report_html(scenes: Sequence[ReportScene], title: str = 'Objects on the table',

@@ -6,7 +6,7 @@ from typing import Any
 
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.pictures import Palette
-from hooc_perception.evaluation.report.scene import EVIDENCE, ReportScene
+from hooc_perception.evaluation.report.scene import EVIDENCE, ReportScene, UNKNOWN
 import numpy as np
 
 MAX_REJECTED = 80
@@ -23,7 +23,9 @@ def object_rows(scene: ReportScene, palette: Palette) -> list[dict[str, Any]]:
         score = by_estimate.get(i)
         evidence = scene.evidence[i] if i < len(scene.evidence) else {}
         verdict = None
-        if scores is not None:
+        if thing.category == UNKNOWN:
+            verdict = 'unknown'
+        elif scores is not None:
             verdict = ('ok' if score.localized else 'far') if score else (
                 'extra' if thing.category in true else 'false')
         rows.append({

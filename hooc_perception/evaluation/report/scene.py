@@ -21,11 +21,16 @@ from hooc_perception.core.types import (
 from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.matching import candidate_objects, posed, PosedObject, shape_of
 from hooc_perception.evaluation.scores import ObjectScore, score_objects
+import numpy as np
 
 # Rejected candidates are distinguished from chosen ones by their position.
 SAME_M = 1e-4
 # What the results say of each object beside its pose.
 EVIDENCE = ('visible_ratio', 'residual_m', 'energy_delta', 'n_views')
+
+
+# Stands for the category of things that have none; no category can have this name, see `fields`.
+UNKNOWN = '(unknown)'
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,7 @@ class ReportScene:
     One scene of the report; everything but the first four is optional.
 
     :ivar observation: the views against the empty table.
-    :ivar objects: the estimate.
+    :ivar objects: the estimate; things of no category, as UNKNOWN, come last.
     :ivar models: {category: GenericModel} of at least the categories that are shown.
     :ivar truth: None where the scene is not annotated.
     :ivar evidence: one dict per object: visible_ratio, residual_m, energy_delta, n_views.
@@ -65,7 +70,9 @@ class ReportScene:
         """Return [ObjectScore] in the order of the truth, None without truth."""
         if self.truth is None:
             return None
-        return score_objects(self.objects, self.truth, self.models)
+        # Things of no category come last: the places of the others stay.
+        known = [o for o in self.objects if o.category != UNKNOWN]
+        return score_objects(known, self.truth, self.models)
 
     @property
     def rejected(self) -> list[PosedObject]:
@@ -125,7 +132,11 @@ def report_scene(entry: Mapping[str, Any], views: Iterable[DepthView | Rectified
     names = tuple(named)
     rectified = [view if isinstance(view, RectifiedView) else rectify(view, config)
                  for view in views]
-    objects = tuple(posed(o) for o in entry['objects'])
+    # Things of no category are drawn as boxes.
+    unknown = [posed(thing | {'category': UNKNOWN}) for thing in entry.get('unknown') or []]
+    objects = (*(posed(o) for o in entry['objects']), *unknown)
+    if unknown:
+        named = {**named, UNKNOWN: box_model()}
     return ReportScene(
         str(entry['scene']), observe(rectified, config), objects, named,
         None if truth is None else tuple(posed(t) for t in truth),
@@ -133,3 +144,13 @@ def report_scene(entry: Mapping[str, Any], views: Iterable[DepthView | Rectified
         entry.get('energy'), entry.get('seconds'), entry.get('stage_seconds') or {},
         probabilities, names, () if pool is None else tuple(candidate_objects(pool, names)),
         bool(entry.get('converged', True)))
+
+
+def box_model() -> GenericModel:
+    """Return a cube of one metre as a GenericModel without samples."""
+    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    faces = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
+                      [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]], np.int32)
+    none = np.zeros((0, 3), np.float32)
+    return GenericModel(UNKNOWN, corners, faces, np.ones(3), none, none, none, 1.0,
+                        np.zeros((0, 4)), np.zeros(0), np.array([2, 2, 2], np.int32))

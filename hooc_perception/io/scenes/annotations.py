@@ -3,8 +3,7 @@
 """
 Check the files of a set that only evaluation tools read: labels, strangers, sequences.
 
-Nothing here uses their content. A mistake in them would surface as a wrong score, so they are
-checked with the rest of the set.
+A mistake in them would surface as a wrong score, so they are checked with the rest of the set.
 """
 
 from collections.abc import Callable, Collection, Sequence
@@ -12,6 +11,7 @@ from pathlib import Path
 
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import camera_files, fields, files
+from hooc_perception.io.scenes.scene import TrueObject
 
 UNKNOWN_KEYS = ('name', 'translation', 'rotation_xyzw', 'size', 'surface_visibility', 'tag')
 SEQUENCE_KEYS = ('name', 'period_s', 'scenes', 'events')
@@ -19,14 +19,13 @@ SEQUENCE_KEYS = ('name', 'period_s', 'scenes', 'events')
 
 def check_scene(folder: Path, cameras: Sequence[str], categories: Collection[str]) -> None:
     """
-    Check labels.yaml, well_seen.yaml and unknown.yaml of a scene's folder, where they exist.
+    Check labels.yaml and well_seen.yaml of a scene's folder, where they exist.
 
     :raises HoocError: one sentence that names file, field and fix.
     """
     checks: dict[str, Callable[[Path], None]] = {
         'labels.yaml': lambda file: _check_labels(file, categories),
-        'well_seen.yaml': lambda file: _check_well_seen(file, cameras),
-        'unknown.yaml': _check_unknown}
+        'well_seen.yaml': lambda file: _check_well_seen(file, cameras)}
     for name, check in checks.items():
         if (folder / name).is_file():
             check(folder / name)
@@ -68,14 +67,25 @@ def _check_well_seen(file: Path, cameras: Sequence[str]) -> None:
             fields.integer(label, 1, 255, f'{file}: {camera}: a label')
 
 
-def _check_unknown(file: Path) -> None:
-    """Check the poses and sizes of strangers."""
+def strangers(folder: Path) -> tuple[TrueObject, ...] | None:
+    """
+    Return the things of unknown.yaml in a scene's folder, None where there is no such file.
+
+    :raises HoocError: one sentence that names file, field and fix.
+    """
+    file = folder / 'unknown.yaml'
+    if not file.is_file():
+        return None
+    things = []
     entry = fields.closed(files.read_yaml(file), ('objects',), f'{file}:')
     for i, item in enumerate(fields.sequence(fields.required(entry, 'objects', f'{file}:'),
                                              f'{file}: objects')):
         where = f'{file}: objects[{i}]'
         item = fields.closed(fields.mapping(item, where), UNKNOWN_KEYS, where)
-        camera_files.pose(item, where)
-        if fields.numbers(fields.required(item, 'size', where), 3, f'{where} size').min() <= 0:
+        translation, rotation = camera_files.pose(item, where)
+        size = fields.numbers(fields.required(item, 'size', where), 3, f'{where} size')
+        if size.min() <= 0:
             raise HoocError(f'{where} size is {item["size"]}; give three positive lengths in '
                             'metres')
+        things.append(TrueObject(str(item.get('name', 'unknown')), translation, rotation, size))
+    return tuple(things)

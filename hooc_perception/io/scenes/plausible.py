@@ -33,21 +33,11 @@ def check_aim(cameras: Iterable[Camera], where: str | Path) -> None:
 def check_unit(views: Sequence[DepthView], depth_files: Sequence[Path],
                depth_units: Sequence[float]) -> None:
     """
-    Raise HoocError where the depth of a scene is in another unit than stated.
-
-    The unit is wrong where most views would show the table, and none does, if all depth were
-    multiplied by one number; or where no depth camera could measure what the files say.
+    Raise HoocError where most views would show the table, and none does, at another unit.
 
     :param views: raw, in the table's frame.
     :param depth_units: metres per count, as stated.
     """
-    for view, file, unit in zip(views, depth_files, depth_units):
-        median = float(np.nanmedian(view.depth[::4, ::4])) if np.isfinite(
-            view.depth[::4, ::4]).any() else 1.0
-        if not NEAREST_M <= median <= FARTHEST_M:
-            raise HoocError(f'{file}: half of its readings lie within {median:.2g} m, so its unit '
-                            f'is not {unit:g} m (depth_unit; in BOP depth_scale, in millimetres); '
-                            'give the metres of one count, 0.001 for millimetres')
     config = ObserveConfig()
     straight = [undistorted(view) for view in views]
     if any(table_sight(view, config.table_band_m, config.workspace_radius_m).sees_table
@@ -61,3 +51,20 @@ def check_unit(views: Sequence[DepthView], depth_files: Sequence[Path],
                         f'were {factor:g} times as large, so its unit seems to be '
                         f'{factor * unit:g} m and not {unit:g} m; correct depth_unit in '
                         'dataset.yaml (or the unit of the extrinsics)')
+
+
+def check_distances(views: Sequence[DepthView], depth_files: Sequence[Path],
+                    depth_units: Sequence[float]) -> None:
+    """
+    Raise HoocError where no depth camera could measure what the files of a scene say.
+
+    :param views: raw, in any frame.
+    :param depth_units: metres per count, as stated.
+    """
+    for view, file, unit in zip(views, depth_files, depth_units):
+        median = float(np.nanmedian(view.depth[::4, ::4])) if np.isfinite(
+            view.depth[::4, ::4]).any() else 1.0
+        if not NEAREST_M <= median <= FARTHEST_M:
+            raise HoocError(f'{file}: half of its readings lie within {median:.2g} m, so its unit '
+                            f'is not {unit:g} m (depth_unit; in BOP depth_scale, in millimetres); '
+                            'give the metres of one count, 0.001 for millimetres')

@@ -61,7 +61,13 @@ def parsed_entry(parsed: ParsedScene, category_names: Sequence[str]) -> dict[str
             'energy_delta': _finite(parsed.energy_delta[i]),
             'n_views': int(parsed.n_views[i]),
             **{name: _finite(sigma[i]) for name, sigma in sigmas.items()}})
-    return {'energy': energy, 'objects': objects, 'converged': bool(parsed.converged),
+    rest = parsed.unknown
+    unknown = [{'score': _finite(rest.score[i]),
+                'translation': rest.translation[i].tolist(),
+                'rotation_xyzw': rest.rotation_xyzw[i].tolist(),
+                'size': np.asarray(rest.size[i], np.float64).tolist()} for i in range(len(rest))]
+    return {'energy': energy, 'objects': objects, 'unknown': unknown,
+            'converged': bool(parsed.converged),
             'stage_seconds': {stage: float(s) for stage, s in parsed.seconds.items()}}
 
 
@@ -140,15 +146,18 @@ def _check_scene(scene: dict[str, Any], where: str) -> None:
                 fields.number(value, f'{where} energy {term}')
     objects = fields.sequence(fields.required(scene, 'objects', where), f'{where} objects')
     for i, item in enumerate(objects):
-        _check_object(item, f'{where} objects[{i}]')
+        item = fields.mapping(item, f'{where} objects[{i}]')
+        fields.text(fields.required(item, 'category', f'{where} objects[{i}]'),
+                    f'{where} objects[{i}] category')
+        if item.get('member') is not None:
+            fields.integer(item['member'], 0, 65535, f'{where} objects[{i}] member')
+        _check_box(item, f'{where} objects[{i}]')
+    for i, item in enumerate(fields.sequence(scene.get('unknown') or [], f'{where} unknown')):
+        _check_box(fields.mapping(item, f'{where} unknown[{i}]'), f'{where} unknown[{i}]')
 
 
-def _check_object(item: object, where: str) -> None:
-    """Check one object's entry; `where` names file, scene and row."""
-    item = fields.mapping(item, where)
-    fields.text(fields.required(item, 'category', where), f'{where} category')
-    if item.get('member') is not None:
-        fields.integer(item['member'], 0, 65535, f'{where} member')
+def _check_box(item: dict[str, Any], where: str) -> None:
+    """Check score, pose and size of one entry; `where` names file, scene and row."""
     if item.get('score') is not None:
         fields.number(item['score'], f'{where} score')
     fields.numbers(fields.required(item, 'translation', where), 3, f'{where} translation')

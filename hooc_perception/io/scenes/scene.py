@@ -9,7 +9,7 @@ from hooc_perception.core.arrays import Float32Array, Float64Array, UInt8Array
 from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.io.scenes import png
-from hooc_perception.io.scenes.plausible import check_aim, check_unit
+from hooc_perception.io.scenes.plausible import check_aim, check_distances, check_unit
 from hooc_perception.io.scenes.table_frame import TableFrameScene
 
 
@@ -61,6 +61,8 @@ class RecordedScene(TableFrameScene):
     :ivar depth_files: one 16-bit PNG per camera, in camera order.
     :ivar depth_units: metres per count, one per camera.
     :ivar source_truth: None for scenes without annotation.
+    :ivar source_strangers: things of none of the set's categories that stand there, their names
+        as `category`; None for scenes where nobody noted them.
     :ivar label_files: {camera name: 8-bit PNG of instance labels}, where there are any.
     """
 
@@ -71,18 +73,28 @@ class RecordedScene(TableFrameScene):
     source_truth: tuple[TrueObject, ...] | None = None
     label_files: dict[str, Path] = field(default_factory=dict)
     table_known: bool = True
+    source_strangers: tuple[TrueObject, ...] | None = None
 
     @property
     def truth(self) -> tuple[TrueObject, ...] | None:
         """Return the ground truth in the table frame, None without annotation."""
-        if self.source_truth is None or self.table is None:
-            return self.source_truth
-        return tuple(_moved(self.table.T_table_source, true) for true in self.source_truth)
+        return self._in_table_frame(self.source_truth)
+
+    @property
+    def strangers(self) -> tuple[TrueObject, ...] | None:
+        """Return the things of no category in the table frame, None where nobody noted them."""
+        return self._in_table_frame(self.source_strangers)
 
     def source_views(self) -> tuple[DepthView, ...]:
-        """Return the raw depth views with the cameras of the source world."""
-        return tuple(DepthView(camera, depth)
-                     for camera, depth in zip(self.source_cameras, self._depth_images))
+        """
+        Return the raw depth views with the cameras of the source world.
+
+        :raises HoocError: as `depth`, but for what only a table's frame tells.
+        """
+        views = tuple(DepthView(camera, depth)
+                      for camera, depth in zip(self.source_cameras, self._depth_images))
+        check_distances(views, self.depth_files, self.depth_units)
+        return views
 
     def depth(self) -> tuple[DepthView, ...]:
         """
@@ -93,8 +105,8 @@ class RecordedScene(TableFrameScene):
         """
         if self.table_known:
             check_aim(self.cameras, self.name)
-        views = tuple(DepthView(camera, depth)
-                      for camera, depth in zip(self.cameras, self._depth_images))
+        views = tuple(replace(view, camera=camera)
+                      for view, camera in zip(self.source_views(), self.cameras))
         check_unit(views, self.depth_files, self.depth_units)
         return views
 
@@ -105,6 +117,12 @@ class RecordedScene(TableFrameScene):
         return {camera.name: png.read_png(self.label_files[camera.name], camera.width,
                                           camera.height, 8)
                 for camera in self.source_cameras if camera.name in self.label_files}
+
+    def _in_table_frame(self, things: tuple[TrueObject, ...] | None
+                        ) -> tuple[TrueObject, ...] | None:
+        if things is None or self.table is None:
+            return things
+        return tuple(_moved(self.table.T_table_source, true) for true in things)
 
     @property
     def _depth_images(self) -> tuple[Float32Array, ...]:

@@ -242,7 +242,8 @@ def _scene(folder: Path, camera_names: Sequence[str], set_cameras: Mapping[str, 
     truth = _truth(truth_file, categories) if truth_file.is_file() else None
     cameras = _scene_cameras(folder, camera_names, set_cameras, path)
     return RecordedScene(name, cameras, depth_files, (unit,) * len(depth_files), truth, labels,
-                         table_known=world != UNKNOWN_WORLD)
+                         table_known=world != UNKNOWN_WORLD,
+                         source_strangers=annotations.strangers(folder))
 
 
 def _truth(file: Path, categories: Sequence[Category]) -> tuple[TrueObject, ...]:

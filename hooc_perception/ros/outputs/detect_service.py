@@ -120,7 +120,10 @@ def scene_json(scene: DetectedScene) -> str:
                      'translation': o.translation.tolist(),
                      'rotation_xyzw': o.rotation_xyzw.tolist(), 'size': o.size.tolist(),
                      'sigma_t': _or_none(o.sigma_t), 'sigma_r': _or_none(o.sigma_r)}
-                    for o in scene.objects]})
+                    for o in scene.objects],
+        'unknown': [{'id': u.id, 'score': _or_none(u.score), 'translation': u.translation.tolist(),
+                     'rotation_xyzw': u.rotation_xyzw.tolist(), 'size': u.size.tolist()}
+                    for u in scene.unknown]})
 
 
 def _or_none(value: float) -> float | None:

@@ -12,6 +12,9 @@ from hooc_perception.ros.messages.conversions import header
 import numpy as np
 from std_msgs.msg import Header
 
+# Namespace of the markers and prefix of the names of things of no category.
+UNKNOWN = 'unknown'
+
 
 @dataclass(frozen=True)
 class DetectedObject:
@@ -52,12 +55,38 @@ class DetectedObject:
 
 
 @dataclass(frozen=True)
+class DetectedUnknown:
+    """
+    Something of no category.
+
+    :ivar id: persistent instance id, unlike those of known objects.
+    :ivar translation: (3,) float64 centre of its box, target frame, metres.
+    :ivar rotation_xyzw: (4,) float64, box axes to target frame.
+    :ivar size: (3,) float64 sides of the box, metres.
+    :ivar hull: (k, 3) float64 corners of its convex hull, target frame, metres.
+    """
+
+    id: int
+    score: float
+    translation: Float64Array
+    rotation_xyzw: Float64Array
+    size: Float64Array
+    hull: Float64Array
+
+    @property
+    def name(self) -> str:
+        """Return a unique name, such as unknown_7."""
+        return f'{UNKNOWN}_{self.id}'
+
+
+@dataclass(frozen=True)
 class DetectedScene:
     """The objects of the frame set of stamp `stamp_ns`, in the target frame `frame`."""
 
     stamp_ns: int
     frame: str
     objects: tuple[DetectedObject, ...]
+    unknown: tuple[DetectedUnknown, ...] = ()
 
     @property
     def header(self) -> Header:
@@ -66,11 +95,13 @@ class DetectedScene:
 
 
 def detected_scene(parsed: ParsedScene, ids: AnyArray, models: Sequence[GenericModel],
-                   stamp_ns: int, frame: str) -> DetectedScene:
+                   stamp_ns: int, frame: str, unknown_ids: AnyArray | None = None,
+                   ) -> DetectedScene:
     """
     Return the DetectedScene of a ParsedScene.
 
     :param ids: (n,) instance ids.
+    :param unknown_ids: those of the things of no category; None = leave these out.
     :param models: class id c is models[c - 1].
     """
     found = parsed.objects
@@ -80,4 +111,8 @@ def detected_scene(parsed: ParsedScene, ids: AnyArray, models: Sequence[GenericM
         DetectedObject(int(ids[i]), int(found.category[i]), int(found.member[i]),
                        float(found.score[i]), found.translation[i], found.rotation_xyzw[i],
                        found.size[i].astype(float), float(sigma_t[i]), float(sigma_r[i]), model)
-        for i, model in enumerate(found.shapes(models))))
+        for i, model in enumerate(found.shapes(models))), tuple(
+            DetectedUnknown(int(number), *row) for number, *row in zip(
+                () if unknown_ids is None else unknown_ids, parsed.unknown.score.tolist(),
+                parsed.unknown.translation, parsed.unknown.rotation_xyzw,
+                parsed.unknown.size.astype(float), parsed.unknown.hulls)))

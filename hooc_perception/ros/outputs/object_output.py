@@ -11,7 +11,7 @@ from hooc_perception.chain import topic_token
 from hooc_perception.core.arrays import AnyArray
 from hooc_perception.core.types import Candidates, GenericModel, ParsedScene
 from hooc_perception.ros.lifecycle.stage_node import StageNode
-from hooc_perception.ros.messages.conversions import header, pose_array_message
+from hooc_perception.ros.messages.conversions import header, pose_array_message, pose_message
 from hooc_perception.ros.messages.point_clouds import cloud_message, row_dtype
 from hooc_perception.ros.messages.stages import (
     labels_json,
@@ -20,6 +20,8 @@ from hooc_perception.ros.messages.stages import (
     objects_messages,
     points_message,
 )
+from hooc_perception.ros.messages.unknown import UNKNOWN_COLUMNS, unknown_messages
+from hooc_perception.ros.outputs.detected import DetectedScene, DetectedUnknown, UNKNOWN
 import numpy as np
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header, String
@@ -45,6 +47,8 @@ class ObjectOutput:
         self._by_category = [
             node.publisher(PoseArray, 'objects/<category>/poses',
                            f'objects/{topic_token(model.name)}/poses') for model in models]
+        self._unknown = node.publisher(PoseArray, 'objects/unknown')
+        self._unknown_attributes = node.publisher(PointCloud2, 'objects/unknown_attributes')
         self._markers = node.publisher(MarkerArray, 'objects/markers')
         self._unexplained = node.publisher(PointCloud2, 'scene/unexplained')
         self._summary = node.publisher(String, 'scene/summary')
@@ -53,25 +57,30 @@ class ObjectOutput:
         """Latch the meaning of the class ids before the first result."""
         self._labels.publish(String(data=labels_json(self.models, self.meshes)))
 
-    def publish(self, parsed: ParsedScene, ids: AnyArray, stamp_ns: int, frame: str,
-                age_s: float, unexplained: AnyArray) -> None:
+    def publish(self, parsed: ParsedScene, scene: DetectedScene, age_s: float,
+                unexplained: AnyArray) -> None:
         """
         Publish one result; `objects/poses` goes last: once it has arrived, so has the rest.
 
-        :param ids: (n,) uint32 instance ids.
+        :param scene: the same with ids, stamp and frame.
         :param age_s: seconds since the stamp.
         :param unexplained: (m, 3) world points.
         """
-        head, found = header(stamp_ns, frame), parsed.objects
+        head, found = scene.header, parsed.objects
+        ids = np.array([o.id for o in scene.objects], np.uint32)
+        unknown_poses, unknown_attributes = unknown_messages(
+            parsed.unknown, np.array([u.id for u in scene.unknown], np.uint32), age_s, head)
         poses, attributes = objects_messages(parsed, ids, age_s, head)
         self._labels.publish(String(data=labels_json(self.models, self.meshes, ids, found)))
         self._attributes.publish(attributes)
         for class_id, publisher in enumerate(self._by_category, 1):
             mine = found.take(found.category == class_id)
             publisher.publish(pose_array_message(mine.translation, mine.rotation_xyzw, head))
-        self._markers.publish(self._markers_message(list(poses.poses), found, ids, head))
+        self._unknown_attributes.publish(unknown_attributes)
+        self._unknown.publish(unknown_poses)
+        self._markers.publish(self._markers_message(list(poses.poses), found, scene))
         self._unexplained.publish(points_message(unexplained, head))
-        self._summary.publish(String(data=summary_json(parsed, stamp_ns)))
+        self._summary.publish(String(data=summary_json(parsed, scene.stamp_ns)))
         self._poses.publish(poses)
 
     def clear(self, stamp_ns: int, frame: str) -> None:
@@ -82,6 +91,8 @@ class ObjectOutput:
         self._attributes.publish(attributes)
         for publisher in self._by_category:
             publisher.publish(PoseArray(header=head))
+        self._unknown_attributes.publish(empty_unknown(head))
+        self._unknown.publish(PoseArray(header=head))
         # DELETEALL also removes the markers of a predecessor that died.
         self._markers.publish(MarkerArray(markers=[
             *self._deleted(set(), head), Marker(header=head, action=Marker.DELETEALL)]))
@@ -94,12 +105,15 @@ class ObjectOutput:
         gone, self._shown = sorted(self._shown - now), now
         return [Marker(header=head, ns=ns, id=number, action=Marker.DELETE) for ns, number in gone]
 
-    def _markers_message(self, poses: Sequence[Pose], found: Candidates, ids: AnyArray,
-                         head: Header) -> MarkerArray:
+    def _markers_message(self, poses: Sequence[Pose], found: Candidates,
+                         scene: DetectedScene) -> MarkerArray:
         """Return DELETE for the markers of objects that are gone, ADD for the current ones."""
-        markers = self._deleted({(self.models[c - 1].name, int(number))
-                                 for c, number in zip(found.category, ids)}, head)
-        for i, (number, model) in enumerate(zip(ids, found.shapes(self.models))):
+        head = scene.header
+        markers = self._deleted({(o.category, o.id) for o in scene.objects}
+                                | {(UNKNOWN, u.id) for u in scene.unknown}, head)
+        markers += [box_marker(u, head) for u in scene.unknown]
+        for i, (number, model) in enumerate(zip((o.id for o in scene.objects),
+                                                found.shapes(self.models))):
             class_id, member = int(found.category[i]), int(found.member[i])
             marker = Marker(header=head, ns=model.name, id=int(number), action=Marker.ADD,
                             type=Marker.MESH_RESOURCE, pose=poses[i],
@@ -111,6 +125,21 @@ class ObjectOutput:
             marker.color.a = 0.8
             markers.append(marker)
         return MarkerArray(markers=markers)
+
+
+def box_marker(thing: DetectedUnknown, head: Header) -> Marker:
+    """Return the grey, translucent box of something of no category."""
+    marker = Marker(header=head, ns=UNKNOWN, id=thing.id, action=Marker.ADD, type=Marker.CUBE,
+                    pose=pose_message(thing.translation, thing.rotation_xyzw))
+    marker.scale.x, marker.scale.y, marker.scale.z = (float(s) for s in thing.size)
+    marker.color.r = marker.color.g = marker.color.b = 0.6
+    marker.color.a = 0.6
+    return marker
+
+
+def empty_unknown(head: Header) -> PointCloud2:
+    """Return an empty `objects/unknown_attributes`."""
+    return cloud_message(np.zeros(0, row_dtype(UNKNOWN_COLUMNS)), head)
 
 
 def empty_clouds(head: Header) -> tuple[PointCloud2, PointCloud2]:

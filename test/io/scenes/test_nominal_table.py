@@ -88,8 +88,10 @@ def test_of_a_bop_dataset_only_its_cameras_are_opened(tmp_path, size):
     (folder / 'depth').mkdir(parents=True)
     (folder / 'depth' / '000001.png').write_bytes(b'nobody looks')
     (folder / 'scene_gt.json').write_text('nobody looks')
+    own = K.copy()
+    own[:2] *= size[0] / 80 if size else 1.0
     (folder / 'scene_camera.json').write_text(json.dumps(
-        {1: {'cam_K': K.ravel().tolist(), 'depth_scale': 0.1}}))
+        {1: {'cam_K': own.ravel().tolist(), 'depth_scale': 0.1}}))
     (path / 'models').mkdir()
     trimesh.creation.box((100, 60, 40)).export(path / 'models' / 'obj_000001.ply')
     if size:

@@ -20,7 +20,7 @@ from hooc_perception.ros.messages.conversions import header
 from hooc_perception.ros.outputs.adapters.choose import AdapterConfig, adapters_of
 from hooc_perception.ros.outputs.adapters.detections import covariance
 from hooc_perception.ros.outputs.adapters.guard import messages_of
-from hooc_perception.ros.outputs.detected import detected_scene, DetectedScene
+from hooc_perception.ros.outputs.detected import detected_scene, DetectedScene, DetectedUnknown
 import trimesh  # noqa: E402
 
 STAMP = 1_700_000_000_250_000_000
@@ -299,3 +299,30 @@ def test_the_table_can_be_left_out(stubs):
     node = Node(planning_scene='box', planning_scene_table=False)
     adapters_of(node)
     assert not hasattr(node, 'hear')
+
+
+@pytest.mark.parametrize('shape', ['mesh', 'box'])
+def test_things_of_no_category_are_obstacles(stubs, scene, shape):
+    stubs.install('moveit_msgs')
+    node = Node(planning_scene=shape, planning_scene_ttl_s=0.0)
+    adapter, = adapters_of(node)
+    body = trimesh.creation.box((0.1, 0.2, 0.06))
+    thing = DetectedUnknown(11, 0.7, np.array([0.3, -0.3, 0.03]), np.array([0, 0, 0, 1.0]),
+                            np.array([0.1, 0.2, 0.06]),
+                            np.array(body.vertices) + [0.3, -0.3, 0.03])
+    adapter.publish(replace(scene, unknown=(thing,)))
+    _, read = stubs.cdr(node.sent['/planning_scene'][0])
+    found = read.world.collision_objects[-1]
+    assert (found.id, found.type.key, found.operation) == ('unknown_11', 'unknown', 0)
+    if shape == 'box':
+        np.testing.assert_allclose(found.primitives[0].dimensions, (0.1, 0.2, 0.06))
+        assert xyz(found.pose.position) == (0.3, -0.3, 0.03)
+    else:
+        mesh = trimesh.Trimesh([xyz(v) for v in found.meshes[0].vertices],
+                               [t.vertex_indices for t in found.meshes[0].triangles],
+                               process=False)
+        assert mesh.is_watertight and mesh.volume == pytest.approx(0.0012)      # outwards
+        np.testing.assert_allclose(mesh.bounds.mean(0), [0.3, -0.3, 0.03])
+    adapter.publish(later(node, scene, 1, [0, 1]))
+    _, read = stubs.cdr(node.sent['/planning_scene'][1])
+    assert ('unknown_11', 1) in [(o.id, o.operation) for o in read.world.collision_objects]

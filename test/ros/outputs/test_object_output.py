@@ -6,13 +6,15 @@ from dataclasses import replace
 import json
 from types import SimpleNamespace
 
-from hooc_perception.core.types import Candidates, Energy, ParsedScene
+from hooc_perception.core.types import Candidates, Energy, ParsedScene, UnknownObjects
 from hooc_perception.objects.derive import derive
 import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
 
+from hooc_perception.ros.messages.point_clouds import cloud_rows
+from hooc_perception.ros.messages.unknown import unknown_from_messages
 from hooc_perception.ros.outputs.detect_service import scene_json
 from hooc_perception.ros.outputs.detected import detected_scene
 from hooc_perception.ros.outputs.object_output import ObjectOutput
@@ -51,7 +53,8 @@ def sent(models, parsed):
     node = SimpleNamespace(publisher=lambda kind, topic, name=None: SimpleNamespace(
         publish=topics.setdefault(name or topic, []).append))
     output = ObjectOutput(node, models, MESHES)
-    output.publish(parsed, np.array([7, 8, 9], np.uint32), STAMP, 'table', 0.1, np.zeros((0, 3)))
+    scene = detected_scene(parsed, np.array([7, 8, 9], np.uint32), models, STAMP, 'table')
+    output.publish(parsed, scene, 0.1, np.zeros((0, 3)))
     return topics
 
 
@@ -83,3 +86,45 @@ def test_adapters_and_the_service_get_the_mesh_of_the_member(models, parsed):
     assert scene.objects[0].model is models[0]
     assert scene.objects[1].model is models[0].variants[0]
     assert [o['member'] for o in json.loads(scene_json(scene))['objects']] == [0, 1, 0]
+
+
+@pytest.fixture
+def open_scene(parsed):
+    """Return the same ParsedScene beside something of no category."""
+    box = trimesh.creation.box((0.1, 0.2, 0.06))
+    return replace(parsed, unknown=UnknownObjects(
+        np.array([[0.3, -0.3, 0.03]]), np.array([[0, 0, 0.6, 0.8]]),
+        np.float32([[0.1, 0.2, 0.06]]), np.float32([0.7]),
+        (np.array(box.vertices) + [0.3, -0.3, 0.03],)))
+
+
+def test_things_of_no_category_have_topics_and_markers_of_their_own(models, parsed, open_scene):
+    topics = {}
+    node = SimpleNamespace(publisher=lambda kind, topic, name=None: SimpleNamespace(
+        publish=topics.setdefault(name or topic, []).append))
+    output = ObjectOutput(node, models, MESHES)
+    known = np.array([7, 8, 9], np.uint32)
+    scene = detected_scene(open_scene, known, models, STAMP, 'table', np.array([11], np.uint32))
+    output.publish(open_scene, scene, 0.1, np.zeros((0, 3)))
+    poses, attributes = topics['objects/unknown'][0], topics['objects/unknown_attributes'][0]
+    assert poses.header.frame_id == 'table' and len(topics['objects/poses'][0].poses) == 3
+    assert poses.poses[0].position.y == -0.3
+    row, = cloud_rows(attributes)
+    assert (row['id'], round(float(row['score']), 6)) == (11, 0.7)
+    np.testing.assert_allclose([row['size_x'], row['size_y'], row['size_z'], row['age_s']],
+                               [0.1, 0.2, 0.06, 0.1], rtol=1e-6)
+    again = unknown_from_messages(poses, attributes)
+    np.testing.assert_array_equal(again.size, open_scene.unknown.size)
+    marker = next(m for m in topics['objects/markers'][0].markers if m.ns == 'unknown')
+    assert (marker.id, marker.type, marker.scale.y) == (11, marker.CUBE, pytest.approx(0.2))
+    thing, = json.loads(scene_json(scene))['unknown']
+    assert thing['id'] == 11 and thing['size'] == pytest.approx([0.1, 0.2, 0.06])
+    # It goes as it came: its marker, and its row.
+    output.publish(parsed, detected_scene(parsed, known, models, STAMP + 1, 'table'), 0.1,
+                   np.zeros((0, 3)))
+    assert topics['objects/unknown'][1].poses == []
+    assert [(m.id, m.action) for m in topics['objects/markers'][1].markers
+            if m.ns == 'unknown'] == [(11, marker.DELETE)]
+    output.clear(STAMP + 2, 'table')
+    assert topics['objects/unknown'][2].poses == []
+    assert topics['objects/unknown_attributes'][2].width == 0

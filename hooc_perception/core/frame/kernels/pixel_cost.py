@@ -5,8 +5,9 @@ The cost of one pixel: first sum of the joint energy (core/energy/joint.py, docs
 
     E(S) = sum_i c_i(S) + ...
 
-c_i is the cost of the object that is nearest at pixel i; where there is none, it is 1 for a
-foreground pixel and 0 for a table pixel. With z the rendered and d the measured depth and
+c_i is the cost of the object that is nearest at pixel i; where there is none, it is
+1 - unknown p_0 for a foreground pixel, with p_0 the probability of something else (background),
+and 0 for a table pixel. With z the rendered and d the measured depth and
 e = (z - d) / tolerance_m, an object costs
 
     |e| + normal (1 - max(0, cos)) + category u     foreground, |e| < 1: AGREES

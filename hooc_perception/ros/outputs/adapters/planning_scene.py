@@ -10,8 +10,14 @@ from hooc_perception.core.arrays import AnyArray, Float64Array
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, pose_message
 from hooc_perception.ros.outputs.adapters.guard import messages_of
-from hooc_perception.ros.outputs.detected import DetectedObject, DetectedScene
+from hooc_perception.ros.outputs.detected import (
+    DetectedObject,
+    DetectedScene,
+    DetectedUnknown,
+    UNKNOWN,
+)
 import numpy as np
+from scipy.spatial import ConvexHull
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
 from std_msgs.msg import Header
 
@@ -51,13 +57,15 @@ class PlanningSceneDiffs:
     def publish(self, scene: DetectedScene) -> None:
         """Add or replace the objects of a result and remove those that have expired."""
         now, self._frame = self._node.now_ns(), scene.frame
-        shown = {o.name: now for o in scene.objects}
+        shown = {o.name: now for o in (*scene.objects, *scene.unknown)}
         # Time was set back (a looped bag): ids start over, and the earlier ones never return.
         gone = [] if scene.stamp_ns >= self._stamp_ns else sorted(set(self._seen) - set(shown))
         self._seen = {name: t for name, t in self._seen.items() if name not in gone} | shown
         self._stamp_ns = scene.stamp_ns
         added = [collision_object(o, scene.header, self._shape, self._messages)
                  for o in scene.objects]
+        added += [unknown_object(u, scene.header, self._shape, self._messages)
+                  for u in scene.unknown]
         self._send(added, gone + self._expired(now), scene.header)
 
     def _on_table(self, outline: PolygonStamped) -> None:
@@ -128,6 +136,33 @@ def collision_object(found: DetectedObject, head: Header, shape: str, messages: 
         scale = found.size / np.maximum(found.model.extents, 1e-9)
         out.meshes = [_mesh(found.model.vertices * scale, found.model.faces)]
         out.mesh_poses = [here]
+    return out
+
+
+def unknown_object(found: DetectedUnknown, head: Header, shape: str, messages: Any) -> Any:
+    """
+    Return the CollisionObject of something of no category; its id is such as unknown_7.
+
+    :param shape: 'mesh' = its convex hull, 'box' = its box.
+    :param messages: the module moveit_msgs.msg.
+    """
+    kind = messages.CollisionObject
+    out = kind(header=head, id=found.name, operation=kind.ADD, pose=_here())
+    out.type.key = UNKNOWN
+    if shape == 'box':
+        out.pose = pose_message(found.translation, found.rotation_xyzw)
+        out.primitives = [SolidPrimitive(type=SolidPrimitive.BOX,
+                                         dimensions=found.size.tolist())]
+        out.primitive_poses = [_here()]
+    else:
+        hull = ConvexHull(found.hull, qhull_options='QJ')
+        # Qhull does not order the corners of its faces: these look outwards.
+        a, b, c = (found.hull[hull.simplices[:, k]] for k in range(3))
+        inwards = np.sum(np.cross(b - a, c - a) * hull.equations[:, :3], axis=1) < 0
+        faces = hull.simplices.copy()
+        faces[inwards] = faces[inwards][:, ::-1]
+        out.meshes = [_mesh(found.hull, faces)]
+        out.mesh_poses = [_here()]
     return out
 
 

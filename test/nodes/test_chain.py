@@ -45,7 +45,8 @@ def heard_answer(bench, stages):
     kinds = {'objects/poses': PoseArray, 'objects/attributes': PointCloud2,
              'objects/labels': String, 'objects/markers': MarkerArray, 'scene/summary': String,
              'scene/unexplained': PointCloud2, 'objects/can/poses': PoseArray,
-             'objects/ball/poses': PoseArray}
+             'objects/ball/poses': PoseArray, 'objects/unknown': PoseArray,
+             'objects/unknown_attributes': PointCloud2}
     return {topic: bench.hear(kind, topic, qos(topic if topic.count('/') == 1
                                                else 'objects/<category>/poses'))
             for topic, kind in kinds.items()}
@@ -159,7 +160,13 @@ def test_the_answer_on_its_topics(chain, folder):
     away = np.hypot(left['x'] - ball[0], left['y'] - ball[1])
     assert len(left) > 20 and np.median(away) < 0.05
     markers = heard['objects/markers'][-1].markers
-    assert [(m.ns, m.action) for m in markers] == [('box', Marker.ADD), ('can', Marker.ADD)]
+    # The ball was left out: something of no category stands there.
+    assert [(m.ns, m.action) for m in markers] == [
+        ('box', Marker.ADD), ('can', Marker.ADD), ('unknown', Marker.ADD)]
+    assert len(heard['objects/unknown'][-1].poses) == 1
+    unknown, = cloud_rows(heard['objects/unknown_attributes'][-1])
+    away = np.hypot(unknown['x'] - ball[0], unknown['y'] - ball[1])
+    assert away < 0.02 and unknown['id'] not in rows['id']
     assert markers[0].mesh_resource == folder.mesh_path('box').as_uri()
     assert markers[0].scale.x == pytest.approx(1.0, abs=1e-6)
 
@@ -174,9 +181,13 @@ def test_empty_tables_are_answers_and_markers_go(chain):
     send()
     assert bench.spin(lambda: all(len(m) >= 2 for m in heard.values()))
     assert heard['objects/poses'][-1].poses == [] and heard['objects/attributes'][-1].width == 0
-    gone = heard['objects/markers'][-1].markers
-    assert {(m.ns, m.id) for m in gone} == first
-    assert all(m.action == Marker.DELETE for m in gone)
+    markers = heard['objects/markers'][-1].markers
+    # The ball, which was left out before, is still of no category; the others have joined it.
+    assert {(m.ns, m.id) for m in markers if m.action == Marker.DELETE} == {
+        key for key in first if key[0] != 'unknown'}
+    assert {m.ns for m in markers if m.action == Marker.ADD} == {'unknown'}
+    assert {('unknown', m.id) for m in markers if m.action == Marker.ADD} >= {
+        key for key in first if key[0] == 'unknown'}
     assert heard['objects/can/poses'][-1].poses == []
 
 
@@ -194,7 +205,7 @@ def test_ids_stay_with_objects_until_they_are_reset(chain):
     box, can = ids([0, 2])
     assert ids([2, 0]) == [can, box]
     # A viewer is told of what is gone, and of nothing else.
-    assert [m.action for m in heard['objects/markers'][-1].markers] == [Marker.ADD] * 2
+    assert [m.action for m in heard['objects/markers'][-1].markers] == [Marker.ADD] * 3
     assert ids([0]) == [box]
     gone = [m for m in heard['objects/markers'][-1].markers if m.action == Marker.DELETE]
     assert [(m.ns, m.id) for m in gone] == [('can', can)]

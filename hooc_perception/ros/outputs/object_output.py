@@ -111,7 +111,6 @@ class ObjectOutput:
         head = scene.header
         markers = self._deleted({(o.category, o.id) for o in scene.objects}
                                 | {(UNKNOWN, u.id) for u in scene.unknown}, head)
-        markers += [box_marker(u, head) for u in scene.unknown]
         for i, (number, model) in enumerate(zip((o.id for o in scene.objects),
                                                 found.shapes(self.models))):
             class_id, member = int(found.category[i]), int(found.member[i])
@@ -124,6 +123,7 @@ class ObjectOutput:
             marker.color.r, marker.color.g, marker.color.b = colorsys.hsv_to_rgb(hue, 0.6, 0.95)
             marker.color.a = 0.8
             markers.append(marker)
+        markers += [box_marker(u, head) for u in scene.unknown]
         return MarkerArray(markers=markers)
 
 

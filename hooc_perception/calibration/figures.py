@@ -40,12 +40,13 @@ def as_text(result: Calibration) -> Iterator[str]:
                   _mm(new.surface_m)) for old, new in result.pairs]
         yield from _table(rows)
     for old, new in result.pairs:
-        if new.shift_m > old.shift_m and not old.trouble:
+        worse = new.shift_m >= old.shift_m and new.turn_deg >= old.turn_deg
+        if worse and not old.trouble:
             yield (f'{" + ".join(old.names)}: no better than before; keep the old poses unless a '
                    'camera has moved')
 
 
-def as_ros(cameras: Sequence[Camera], frame: str = 'table') -> Iterator[str]:
+def as_ros(cameras: Sequence[Camera], frame: str) -> Iterator[str]:
     """Yield, per camera, a static_transform_publisher command and the node parameter."""
     for camera in cameras:
         t, q = pose_from_matrix(camera.T_world_camera)

@@ -7,12 +7,15 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from hooc_perception.core.arrays import Float64Array
+from hooc_perception.core.geometry import inverse
 from hooc_perception.core.segment.checks import same_calibration
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.reader import BagScene
 from hooc_perception.io.scenes.scene import RecordedScene
 from hooc_perception.io.scenes.scene_set import SceneSet
+import numpy as np
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,15 +24,26 @@ class Recording:
     What a rig of fixed cameras has recorded.
 
     :ivar cameras: as stated; poses in the frame of the table.
+    :ivar frame: name of the frame of the poses in the files, `table` where it is the table's.
+    :ivar T_frame_table: (4, 4) from the table frame to that one; the identity where they are one.
     :ivar frames: per frame set, where it comes from and which one it is.
     :ivar groups: per frame set a number, the same for those of one bag or one scene.
     :ivar left_out: one sentence on what is not used, None where all is.
     """
 
     cameras: tuple[Camera, ...]
+    frame: str
+    T_frame_table: Float64Array
     frames: tuple[tuple[RecordedScene | BagScene, dict[str, int] | None], ...]
     groups: tuple[int, ...]
     left_out: str | None = None
+
+    def in_frame(self, cameras: Sequence[Camera]) -> tuple[Camera, ...]:
+        """Return cameras, posed in the table frame, with poses in the frame of the files."""
+        if np.array_equal(self.T_frame_table, np.eye(4)):
+            return tuple(cameras)
+        return tuple(replace(camera, T_world_camera=self.T_frame_table @ camera.T_world_camera)
+                     for camera in cameras)
 
     def read(self) -> Iterator[tuple[DepthView, ...]]:
         """Yield the DepthViews of each frame set, all with the same cameras."""
@@ -61,8 +75,9 @@ def of_set(scene_set: SceneSet) -> Recording:
     used = [scene for scene, rig in zip(scene_set.scenes, rig_of) if rig == most]
     left_out = (f'{len(rig_of) - count} of {len(rig_of)} scenes are left out, because the cameras '
                 'stand elsewhere there' if count < len(rig_of) else None)
-    return Recording(used[0].cameras, tuple((scene, None) for scene in used),
-                     tuple(range(count)), left_out)
+    frame = scene_set.world_frame if used[0].table is None else 'world'
+    return Recording(used[0].cameras, frame, _T_frame_table(used[0]),
+                     tuple((scene, None) for scene in used), tuple(range(count)), left_out)
 
 
 def of_bags(paths: Sequence[Path], frames: int) -> Recording:
@@ -88,7 +103,13 @@ def of_bags(paths: Sequence[Path], frames: int) -> Recording:
             taken.append((bag, {name: int(share * max(count - 2, 0))
                                 for name, count in counts.items()}))
             groups.append(group)
-    return Recording(bags[0].cameras, tuple(taken), tuple(groups))
+    return Recording(bags[0].cameras, bags[0].world_frame, _T_frame_table(bags[0]), tuple(taken),
+                     tuple(groups))
+
+
+def _T_frame_table(scene: RecordedScene | BagScene) -> Float64Array:
+    """Return the pose (4, 4) of the table frame in the frame of the files."""
+    return np.eye(4) if scene.table is None else inverse(scene.table.T_table_source)
 
 
 def _same(a: Sequence[Camera], b: Sequence[Camera]) -> bool:

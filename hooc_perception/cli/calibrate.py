@@ -52,16 +52,17 @@ def run(args: Namespace) -> None:
         print(line)
     assert out is not None
     out.parent.mkdir(parents=True, exist_ok=True)
-    write_cameras(out, result.cameras)
-    print(f'\n{len(result.cameras)} cameras -> {out}')
-    if len(result.cameras) == 1:
+    cameras = recording.in_frame(result.cameras)
+    write_cameras(out, cameras)
+    print(f'\n{len(cameras)} cameras in the frame {recording.frame!r} -> {out}')
+    if len(cameras) == 1:
         print('a single camera is only levelled: height, roll and pitch')
     if picture:
         picture.parent.mkdir(parents=True, exist_ok=True)
         write_picture(picture, next(recording.read()), result)
         print(f'before and after -> {picture}')
     if args.ros:
-        for line in ('', *as_ros(result.cameras)):
+        for line in ('', *as_ros(cameras, recording.frame)):
             print(line)
 
 

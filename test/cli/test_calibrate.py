@@ -14,6 +14,7 @@ from hooc_perception.io.scenes.camera_files import load_cameras
 from hooc_perception.io.scenes.scene_set import load_scene_set, NewScene, write_scene_set
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 import trimesh
 
 
@@ -79,6 +80,23 @@ def test_a_bare_table_writes_nothing(tabletop, true, stated, tmp_path, capsys):
     assert main(['calibrate', str(path), '--out', str(tmp_path / 'c.yaml')]) == 1
     assert 'cannot be observed' in capsys.readouterr().err
     assert not (tmp_path / 'c.yaml').exists()
+
+
+def test_poses_are_written_in_the_frame_of_the_set(tabletop, true, tmp_path, capsys):
+    """The world is not a table's: it is tilted, and the table lies 0.7 m above its origin."""
+    T_world_table = np.eye(4)
+    T_world_table[:3, :3] = Rotation.from_rotvec([0.3, 0.1, 0.5]).as_matrix()
+    T_world_table[:3, 3] = 0.2, -0.4, 0.7
+    elsewhere = tuple(replace(c, T_world_camera=T_world_table @ c.T_world_camera) for c in true)
+    path = written(tmp_path / 'set', tabletop, true, elsewhere)
+    text = (path / 'dataset.yaml').read_text()
+    (path / 'dataset.yaml').write_text(text.replace('world_frame: table', 'world_frame: unknown'))
+    out = tmp_path / 'cameras.yaml'
+    assert main(['calibrate', str(path), '--out', str(out), '--ros']) == 0
+    for before, after in zip(elsewhere, load_cameras(out).values()):
+        mm, deg = tabletop.pose_error(before.T_world_camera, after.T_world_camera)
+        assert mm < 5 and deg < 0.3
+    assert '--frame-id world' in capsys.readouterr().out
 
 
 def bag_of(folder, tabletop, true, stated, seed):

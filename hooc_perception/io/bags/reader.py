@@ -47,6 +47,7 @@ class BagScene(TableFrameScene):
     :ivar info: content of /hooc/scene_info (dataset, scene, categories, max_instances, truth,
         world_frame, ...); defaults if a bag has none.
     :ivar name: the scene's name; the bag's if it has none.
+    :ivar world_frame: name of the frame of `source_cameras`.
     :ivar table_known: whether the world frame is known to be a table's.
     """
 
@@ -77,6 +78,7 @@ class BagScene(TableFrameScene):
         wanted = self._wanted_world(contents.tree, world_frame)
         self.table_known: bool = wanted is not None
         world = plain(wanted or contents.tree.root(next(iter(frames.values()))))
+        self.world_frame: str = world
         self.source_cameras: tuple[Camera, ...] = tuple(
             replace(camera, T_world_camera=self._pose(contents.tree, world, camera.name,
                                                       frames[camera.name]))

@@ -12,6 +12,7 @@ from typing import Any, IO
 
 from hooc_perception.errors import HoocError
 from hooc_perception.io.scenes import files
+from hooc_perception.ros.lifecycle.misaddressed import unknown_parameters
 
 
 def unreached_sections(path: Path, names: Sequence[str], namespace: str) -> list[str]:
@@ -34,6 +35,19 @@ def unreached_sections(path: Path, names: Sequence[str], namespace: str) -> list
             f'{path}: the section {section!r} applies to no node'
             + (f'; write /**/{near[0]}' if near else f'; the nodes are {", ".join(nodes)}'))
     return sentences
+
+
+def check_parameters(path: Path, names: Sequence[str], namespace: str) -> None:
+    """
+    Raise HoocError where a ROS parameter file gives the nodes a parameter that none of them has.
+
+    :param names, namespace: as `unreached_sections`.
+    """
+    nodes = [f'{namespace.rstrip("/")}/{name}' for name in names]
+    for section, values in _sections(files.read_yaml(path)):
+        if any(_reaches(section, node) for node in nodes):
+            for sentence in unknown_parameters(_flat(values)):
+                raise HoocError(f'{path}: section {section!r}: {sentence}')
 
 
 def open_last_file(parameters: Mapping[str, Any], node: str, params_file: Path | None = None,
@@ -79,6 +93,15 @@ def _sections(content: Mapping[Any, Any], prefix: str = '') -> Iterator[tuple[st
         if 'ros__parameters' in value:
             yield name, value['ros__parameters']
         yield from _sections({k: v for k, v in value.items() if k != 'ros__parameters'}, name)
+
+
+def _flat(values: object, prefix: str = '') -> Iterator[str]:
+    """Yield the names of parameters, which may be nested."""
+    for key, value in values.items() if isinstance(values, dict) else ():
+        if isinstance(value, dict):
+            yield from _flat(value, f'{prefix}{key}.')
+        else:
+            yield f'{prefix}{key}'
 
 
 def _reaches(section: str, node: str) -> bool:

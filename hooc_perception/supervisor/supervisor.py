@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 from hooc_perception.chain import CHAIN
 from hooc_perception.errors import HoocError
 from hooc_perception.supervisor.environment import full_namespace, isolate, use_large_segments
-from hooc_perception.supervisor.params_file import unreached_sections
+from hooc_perception.supervisor.params_file import check_parameters, unreached_sections
 from hooc_perception.supervisor.processes import NodeProcess
 from hooc_perception.supervisor.services import NodeServices
 from hooc_perception.supervisor.shared_memory import free_orphans
@@ -122,6 +122,7 @@ class Supervisor:
         use_large_segments(len(self.names) + 1)
         free_orphans()
         if self._params_file:
+            check_parameters(self._params_file, self.names, self.namespace)
             for sentence in unreached_sections(self._params_file, self.names, self.namespace):
                 print(f'[WARN] {sentence}', file=sys.stderr, flush=True)
         for name in self.names:

@@ -13,6 +13,8 @@ from hooc_perception.core.profiles import profile, profiles_with
 
 # Parameters `<kind>.<camera>` of the ingestion node.
 _PER_CAMERA = ('extrinsics', 'image_topic', 'info_topic', 'driver')
+# Of other kinds, names are only known once the cameras and topics are.
+_OPEN = (*_PER_CAMERA, 'mask_image', 'qos_overrides')
 _OF_ROS = ('use_sim_time', 'start_type_description_service')
 
 
@@ -30,6 +32,17 @@ def misaddressed(given: Iterable[str], declared: Iterable[str]) -> list[str]:
         return []
     elsewhere = known_elsewhere() | set(declared)
     return [_sentence(name, elsewhere, declared) for name in unknown if name not in elsewhere]
+
+
+def unknown_parameters(given: Iterable[str]) -> list[str]:
+    """
+    Return one sentence for each parameter that no node can have, whatever its cameras.
+
+    :param given: names, with dots between their parts.
+    """
+    known = known_elsewhere() | set(_OF_ROS)
+    return [_sentence(name, known, ()) for name in sorted(set(given) - known)
+            if name.partition('.')[0] not in _OPEN]
 
 
 def inert(given: Iterable[str], stages: Mapping[str, Config]) -> list[str]:

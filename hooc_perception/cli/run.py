@@ -98,7 +98,20 @@ def check_bags(bags: 'Sequence[BagScene]', record: Path | None) -> None:
                             'another folder')
         for warning in bag.warnings:
             print(f'warning: {warning}', file=sys.stderr)
-        bag.views()
+        check_table(bag)
+
+
+def check_table(bag: 'BagScene') -> None:
+    """Raise HoocError where no camera of a bag shows the table; warn of those that do not."""
+    from hooc_perception.core.segment.observe import observe, require_table
+    from hooc_perception.core.segment.rectify import rectify
+    try:
+        observation = require_table(observe([rectify(view) for view in bag.views()]))
+    except HoocError as error:
+        at = '' if str(bag.path) in str(error) else f'{bag.path}: '
+        raise HoocError(f'{at}{error}') from None
+    for sentence in observation.troubles:
+        print(f'warning: {bag.path}: {sentence}', file=sys.stderr)
 
 
 def bag_paths(given: Iterable[Path]) -> list[Path]:

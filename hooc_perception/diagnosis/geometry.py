@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from hooc_perception.core.classification.classify import KIND_PAPER
 from hooc_perception.core.segment.checks import pose_trouble, rig_trouble
 from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.level import level
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
 from hooc_perception.core.types import Camera, ObservedView
@@ -61,11 +62,23 @@ def check_geometry(path: Path, config: ObserveConfig = ObserveConfig()) -> Itera
     except HoocError as error:
         yield Finding(ERROR, 'geometry', str(error))
         return
+    troubled = set()
+    for sentence in observation.troubles:
+        yield Finding(ERROR, 'table', sentence)
+        troubled.update(view.camera.name for view in rectified
+                        if sentence.startswith(f'camera {view.camera.name}: '))
     for before, after in zip(rectified, observation.views):
-        yield check_view(before.camera, after, config)
+        if before.camera.name not in troubled:
+            yield check_view(before.camera, after, config)
+    if troubled:
+        return      # what follows would compare surfaces that are not the table
     yield from check_pairs(observation)
     noise_mm = 1000 * observation.noise_m
-    if noise_mm > NOISY_TABLE_MM:
+    if not any(np.isfinite(level(view, config, config.workspace_radius_m)[1])
+               for view in rectified):
+        yield Finding(WARNING, 'table', 'too little of it is seen to measure its noise; check '
+                      'that the cameras look at it')
+    elif noise_mm > NOISY_TABLE_MM:
         yield Finding(WARNING, 'table', f'its measured heights scatter by {noise_mm:.1f} mm, so '
                       'flat objects are lost; check the sensors and that the table is flat')
     else:

@@ -70,6 +70,11 @@ def decode_depth(data: Buffer, height: int, width: int, encoding: str, step: int
     return depth
 
 
+def encoded_unit(encoding: str) -> float:
+    """Return the metres per count that a depth encoding means."""
+    return 1.0 if encoding == METRES else 0.001
+
+
 def decode_image(data: Buffer, height: int, width: int, dtype: npt.DTypeLike, step: int = 0,
                  is_bigendian: bool | int = False) -> AnyArray:
     """

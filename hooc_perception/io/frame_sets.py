@@ -18,8 +18,8 @@ from hooc_perception.io.set_back import SetBack
 Frame = TypeVar('Frame')
 
 # Why a frame was dropped that the user would rather have kept, in words.
-EXPLAINED = {'stale': 'its stamp is too old by the clock of this node (wrong clock, or recorded '
-                      'data without use_sim_time; max_frame_age_s 0 accepts any age)',
+EXPLAINED = {'stale': 'its stamp is too old by the clock of this node (wrong clock, or simulated '
+                      'or recorded data without use_sim_time; max_frame_age_s 0 accepts any age)',
              'future': 'its stamp lies in the future by the clock of this node; synchronise the '
                        'clocks of the computers (max_frame_age_s 0 accepts any stamp)',
              'no_stamp': 'its stamp is zero; let the driver stamp its images',

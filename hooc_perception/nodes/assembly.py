@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Raw images of several cameras -> frame sets of rectified views; every loss is reported."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from hooc_perception.io.frame_sets import EXPLAINED, FrameSet, FrameSets, SILENT
 from hooc_perception.nodes.ingestion_config import IngestionConfig
 from hooc_perception.nodes.robot_view import RobotView
 from hooc_perception.nodes.warm_up import overhead_camera
+from hooc_perception.ros.inputs.image_notes import ImageNotes
 from hooc_perception.ros.inputs.joint_states import StateUnknown
 from hooc_perception.ros.inputs.raw_frames import FrameRefused, RawFrame, RawFrames
 from hooc_perception.ros.lifecycle.stage_node import StageNode
@@ -39,18 +40,20 @@ class Assembly:
     """
 
     def __init__(self, node: StageNode[IngestionConfig, Any], names: Sequence[str],
-                 robot: RobotView) -> None:
+                 robot: RobotView,
+                 stated: Mapping[str, Callable[[], ImageNotes]]) -> None:
         """
         Assemble for a StageNode.
 
         :param robot: sets the robot aside.
+        :param stated: {camera: returns what the user states of its images}.
         :raises HoocError: if there are fewer cameras than `min_cameras`.
         """
         self._node, self._names, self._robot = node, tuple(names), robot
         if node.config.min_cameras > len(self._names):
             raise HoocError(self._too_few())
         self.sets: FrameSets[RawFrame] = FrameSets(self._names, node.config)
-        self.frames = {name: RawFrames(name) for name in self._names}
+        self.frames = {name: RawFrames(name, stated[name]) for name in self._names}
         self._apart = 0     # frames that were dropped as `spread` since the last set
 
     def add(self, name: str, image: Image, info: CameraInfo, transform: TransformStamped,

@@ -3,6 +3,7 @@
 """Stage 1: raw depth images of N cameras -> observed frame sets."""
 
 from collections.abc import Sequence
+from functools import partial
 import sys
 import time
 from typing import Any
@@ -35,6 +36,7 @@ from hooc_perception.ros.health.playback import Playback
 from hooc_perception.ros.inputs.camera_input import CameraInput
 from hooc_perception.ros.inputs.camera_poses import PoseParameters, TfPoses
 from hooc_perception.ros.inputs.camera_topics import CameraTopics, TopicParameters
+from hooc_perception.ros.inputs.image_notes import ImageParameters
 from hooc_perception.ros.inputs.joint_states import StateUnknown
 from hooc_perception.ros.inputs.raw_frames import RawFrame
 from hooc_perception.ros.lifecycle.spin import run_node
@@ -56,6 +58,7 @@ class IngestionNode(StageNode[IngestionConfig, 'Ingestion']):
         """Declare parameters."""
         super().__init__(INGESTION, **kwargs)
         self.poses, self.topics = PoseParameters(self), TopicParameters(self)
+        self.images = ImageParameters(self)
 
     @property
     def observe_config(self) -> ObserveConfig:
@@ -88,7 +91,14 @@ class Ingestion:
         self._node, self._names = node, camera_names(node)
         self._tf = TfPoses(node)
         self.robot = RobotView(node, self._names, self._tf, self._on_robot_state)
-        self.assembly = Assembly(node, self._names, self.robot)
+        for name in self._names:
+            node.poses.declare(name)
+            node.topics.declare(name)
+            node.images.declare(name)
+        topics = self._topics()
+        self.assembly = Assembly(node, self._names, self.robot, {
+            name: partial(node.images.notes, name, node.resolve_topic_name(t.image))
+            for name, t in topics.items()})
         # A set that waits for the state of the robot at its stamps.
         self._held: FrameSet[RawFrame] | None = None
         if node.config.warm_up:
@@ -101,12 +111,9 @@ class Ingestion:
         self._refused = node.publisher(Header, 'views/refused')
         self.pace = Pace(node, self._send_if_complete)
         self._rig_health = RigHealth(node)
-        for name in self._names:
-            node.poses.declare(name)
-            node.topics.declare(name)
         self._playback = Playback(node)
-        self.inputs = [CameraInput(node, name, topics, node.poses, self._tf, self._on_frame)
-                       for name, topics in self._topics().items()]
+        self.inputs = [CameraInput(node, name, t, node.poses, self._tf, self._on_frame)
+                       for name, t in topics.items()]
         node.steady_timer(0.5, self._on_timer)
 
     def _topics(self) -> dict[str, CameraTopics]:

@@ -315,6 +315,76 @@ def test_clocks_that_are_off(sound, tmp_path, seconds, word):
     assert word in text and 'synchronise' in text
 
 
+def scaled(factor):
+    """Return an edit that multiplies all depth."""
+    def edit(topic, message, i):
+        if topic.endswith('image_raw'):
+            message.data = np.rint(message.data.view('<u2') * factor).astype('<u2').view(np.uint8)
+        return message
+    return edit
+
+
+@pytest.mark.parametrize('factor, words', [
+    (0.25, ['4 times as large', '0.004 m']), (0.1, ['10 times as large', '0.01 m']),
+    (0.5, ['2 times as large']), (2.0, ['0.5 times as large', '0.0005 m'])])
+def test_units_that_only_the_table_gives_away(sound, tmp_path, factor, words):
+    text = found(rewritten(sound, tmp_path / 'bag', scaled(factor)), ERROR)
+    for word in (*words, 'image_raw', 'hooc.yaml'):
+        assert word in text, text
+
+
+@pytest.mark.parametrize('height', [0.75, -0.3])
+def test_a_table_frame_that_is_not_on_the_table(sound, tmp_path, height):
+    def edit(topic, message, i):
+        for stamped in transforms(topic, message):
+            stamped.transform.translation.z += height
+        return message
+    bag = rewritten(sound, tmp_path / 'bag', edit)
+    text = found(bag, ERROR)
+    assert f'z = {height:.2f} m' in text or f'z = {height + 0.01:.2f} m' in text, text
+    assert 'z = 0 is the table top' in text
+    # What nobody has measured is not printed as a measurement.
+    assert 'scatter' not in '\n'.join(f.text for f in check_bag(bag))
+
+
+def test_hooc_run_refuses_a_bag_without_table_before_it_starts_nodes(sound, tmp_path, capsys,
+                                                                   repository, monkeypatch):
+    def edit(topic, message, i):
+        for stamped in transforms(topic, message):
+            stamped.transform.translation.z += 0.75
+        return message
+    monkeypatch.setattr('hooc_perception.cli.run.play', lambda *args: pytest.fail('started'))
+    bag = rewritten(sound, tmp_path / 'bag', edit)
+    assert main(['run', str(bag), '--model', str(repository / 'models/demo'), '--out',
+                 str(tmp_path / 'o.json')]) == 1
+    assert f'{bag}: camera camera0' in capsys.readouterr().err
+
+
+def test_stamps_of_a_simulator(sound, tmp_path):
+    def edit(topic, message, i):
+        if '/depth/' in topic:
+            message.header.stamp.sec = 12 + i
+        return message
+    text = found(rewritten(sound, tmp_path / 'bag', edit), WARNING)
+    assert 'use_sim_time' in text and 'synchronise' not in text
+
+
+@pytest.mark.parametrize('change, words', [
+    (lambda info: setattr(info, 'k', info.k * [2, 1, 2, 1, 2, 2, 1, 1, 1]),
+     ['camera0', 'principal point', '160 x 120']),
+    (lambda info: setattr(info, 'd', np.array([-1385.2, 842.6, 3120.5, -77.1, 12.9])),
+     ['camera0', 'no lens']),
+    (lambda info: setattr(info, 'distortion_model', 'equidistant'), ['camera0', 'equidistant'])])
+def test_calibrations_that_cannot_be_meant(sound, tmp_path, change, words):
+    def edit(topic, message, i):
+        if topic.endswith('camera0/depth/camera_info'):
+            change(message)
+        return message
+    text = found(rewritten(sound, tmp_path / 'bag', edit), ERROR)
+    for word in words:
+        assert word in text, text
+
+
 def test_metres_in_whole_numbers(sound, tmp_path):
     def edit(topic, message, i):
         if topic.endswith('image_raw'):

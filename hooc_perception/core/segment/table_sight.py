@@ -19,7 +19,7 @@ REACH, LEVEL_DEG, MIN_LEVEL_SHARE = 2, 20.0, 0.3
 # depth cameras count in.
 FACTORS = (1000.0, 100.0, 39.37, 25.4, 10.0, 8.0, 5.0, 4.0, 2.54, 2.0,
            0.5, 0.3937, 0.25, 0.2, 0.125, 0.1, 0.03937, 0.0254, 0.01, 0.001)
-FACTOR_TOLERANCE, FACTOR_SHARE = 0.05, 0.3
+FACTOR_TOLERANCE, FACTOR_SHARE, FACTOR_BIAS = 0.05, 0.3, 0.02
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,12 @@ def depth_factor(view: RectifiedView, radius_m: float) -> float | None:
         return None
     shares = [float((np.abs(ratio / factor - 1) < FACTOR_TOLERANCE).mean()) for factor in FACTORS]
     best = int(np.argmax(shares))
-    return FACTORS[best] if shares[best] >= FACTOR_SHARE else None
+    agreeing = ratio[np.abs(ratio / FACTORS[best] - 1) < FACTOR_TOLERANCE]
+    # A table that lies elsewhere has a ratio, too, but hardly that of a unit.
+    if shares[best] < FACTOR_SHARE or (
+            abs(np.median(agreeing) / FACTORS[best] - 1) > FACTOR_BIAS):
+        return None
+    return FACTORS[best]
 
 
 def _thinned(view: RectifiedView) -> tuple[Float32Array, Camera]:

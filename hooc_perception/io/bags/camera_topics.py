@@ -3,7 +3,7 @@
 """Find the depth cameras among the topics of a bag, and their calibrations."""
 
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 import re
 from typing import Any, TYPE_CHECKING
@@ -111,6 +111,12 @@ def cameras_without_depth(topics: Mapping[str, 'BagTopic'], found: Iterable[str]
                 or kind == 'Image' and 'depth' in topic.lower() and not details.count):
             names.add(_camera_name(folder))
     return sorted(names - set(found))
+
+
+def in_camera_order(found: Mapping[str, str], order: Sequence[str]) -> dict[str, str]:
+    """Return {camera: topic} in the order of scene_info, unlisted cameras last."""
+    return dict(sorted(found.items(), key=lambda item: (
+        order.index(item[0]) if item[0] in order else len(order), item[0])))
 
 
 def _rank(topic: str, infos: Collection[str]) -> tuple[bool, bool, bool, bool, int, str]:

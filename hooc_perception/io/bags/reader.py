@@ -8,7 +8,7 @@ beside its image, and its pose in extrinsics topics or /tf_static. If no frame i
 table's, it is estimated from the depth.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
@@ -23,18 +23,23 @@ from hooc_perception.io.bags.camera_topics import (
     bag_camera,
     cameras_without_depth,
     depth_topics,
+    in_camera_order,
 )
 from hooc_perception.io.bags.contents import beside, image_frames, read_contents, TABLE_FRAME
 from hooc_perception.io.bags.files import BagMessage, BagTopic, iter_messages, oddities, topics
 from hooc_perception.io.bags.frames import FrameTree, plain
 from hooc_perception.io.bags.images import read_image
-from hooc_perception.io.depth_encodings import decode_depth, decode_image
+from hooc_perception.io.depth_encodings import decode_depth, decode_image, encoded_unit
 from hooc_perception.io.depth_units import depth_unit_error
+from hooc_perception.io.scenes.plausible import check_aim, check_unit
 from hooc_perception.io.scenes.scene import TrueObject
 from hooc_perception.io.scenes.table_frame import TableFrameScene
 import numpy as np
 
 __all__ = ['BagMessage', 'BagScene', 'BagTopic', 'iter_messages', 'topics']
+
+_UNIT_FIX = ('publish 16UC1 in millimetres or 32FC1 in metres, state depth_unit in hooc.yaml '
+             'beside the recording, or correct the unit of the extrinsics')
 
 
 class BagScene(TableFrameScene):
@@ -66,7 +71,7 @@ class BagScene(TableFrameScene):
         self.info: dict[str, Any] = contents.info
         self.name: str = self.info['scene']
         self._notes = contents.notes
-        self.depth_topics: dict[str, str] = _in_camera_order(depth_topics(
+        self.depth_topics: dict[str, str] = in_camera_order(depth_topics(
             contents.first_images, contents.camera_infos, self.path), self.info['cameras'])
         self._all_topics = all_depth_topics(contents.first_images, contents.camera_infos)
         firsts = {name: contents.first_images[topic] for name, topic in self.depth_topics.items()}
@@ -79,6 +84,9 @@ class BagScene(TableFrameScene):
         self.table_known: bool = wanted is not None
         world = plain(wanted or contents.tree.root(next(iter(frames.values()))))
         self.world_frame: str = world
+        # Metres per count, as stated or by the encoding.
+        self._units = {name: self.depth_unit(name) or encoded_unit(image.encoding)
+                       for name, image in firsts.items()}
         self.source_cameras: tuple[Camera, ...] = tuple(
             replace(camera, T_world_camera=self._pose(contents.tree, world, camera.name,
                                                       frames[camera.name]))
@@ -116,9 +124,14 @@ class BagScene(TableFrameScene):
         :param images: {camera: which of its images, from 0 on}; an image without a reading is
             replaced by the next one. None takes the first moment at which every camera has an
             image, and each camera's image nearest to it.
-        :raises HoocError: if an image is damaged or holds no reading.
+        :raises HoocError: if an image is damaged or holds no reading, is in another unit than
+            stated, or a camera does not look at the table.
         """
         chosen = self._first_views if images is None else self._views_of(images)
+        if self.table_known:
+            check_aim(self.cameras, self.path)
+            check_unit(chosen, [f'{self.path}: {topic}' for topic in self.depth_topics.values()],
+                       [self._units[name] for name in self.depth_topics], _UNIT_FIX)
         return tuple(replace(view, camera=camera)
                      for view, camera in zip(chosen, self.cameras))
 
@@ -232,12 +245,6 @@ class BagScene(TableFrameScene):
                             f'{frame!r}) with {world!r}; record /tf_static or '
                             f'{beside(self.depth_topics[camera_name], "extrinsics")} too')
         return T_world_camera
-
-
-def _in_camera_order(found: Mapping[str, str], order: Sequence[str]) -> dict[str, str]:
-    """Return {camera: topic} in the order of scene_info, unlisted cameras last."""
-    return dict(sorted(found.items(), key=lambda item: (
-        order.index(item[0]) if item[0] in order else len(order), item[0])))
 
 
 def _stamp_ns(header: Any) -> int:

@@ -16,6 +16,7 @@ import numpy as np
 
 # Nearer and beyond the range of any depth camera that looks at a table.
 NEAREST_M, FARTHEST_M = 0.05, 30.0
+_FIX = 'correct depth_unit in dataset.yaml (or the unit of the extrinsics)'
 
 
 def check_aim(cameras: Iterable[Camera], where: str | Path) -> None:
@@ -30,13 +31,14 @@ def check_aim(cameras: Iterable[Camera], where: str | Path) -> None:
             raise HoocError(f'{where}: camera {camera.name}: {trouble}')
 
 
-def check_unit(views: Sequence[DepthView], depth_files: Sequence[Path],
-               depth_units: Sequence[float]) -> None:
+def check_unit(views: Sequence[DepthView], depth_files: Sequence[Path | str],
+               depth_units: Sequence[float], fix: str = _FIX) -> None:
     """
     Raise HoocError where most views would show the table, and none does, at another unit.
 
     :param views: raw, in the table's frame.
     :param depth_units: metres per count, as stated.
+    :param fix: the end of the sentence.
     """
     config = ObserveConfig()
     straight = [undistorted(view) for view in views]
@@ -49,8 +51,7 @@ def check_unit(views: Sequence[DepthView], depth_files: Sequence[Path],
         unit = depth_units[0]
         raise HoocError(f'{depth_files[0]}: the cameras would see the table at z = 0 if all depth '
                         f'were {factor:g} times as large, so its unit seems to be '
-                        f'{factor * unit:g} m and not {unit:g} m; correct depth_unit in '
-                        'dataset.yaml (or the unit of the extrinsics)')
+                        f'{factor * unit:g} m and not {unit:g} m; {fix}')
 
 
 def check_distances(views: Sequence[DepthView], depth_files: Sequence[Path],

@@ -11,15 +11,21 @@ from typing import Any, TypeVar
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.core.config import param
 from hooc_perception.errors import HoocError
+from hooc_perception.io.compressed_depth import decode_compressed_depth
 from hooc_perception.ros.health.silence import why_silent
 from hooc_perception.ros.inputs.camera_poses import PoseNotYet, PoseParameters, TfPoses
 from hooc_perception.ros.inputs.camera_topics import CameraTopics, DRIVERS, OURS
 from hooc_perception.ros.lifecycle.stage_config import StageConfig
 from hooc_perception.ros.lifecycle.stage_node import StageNode
-from hooc_perception.ros.messages.conversions import header, nanoseconds, transform_message
+from hooc_perception.ros.messages.conversions import (
+    header,
+    image_message,
+    nanoseconds,
+    transform_message,
+)
 from hooc_perception.ros.qos import auto_reliability, overridable, qos
 from rclpy.subscription import Subscription
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 # Called with the camera's name and messages that belong together.
 FrameCallback = Callable[[str, Image, CameraInfo, TransformStamped], None]
@@ -70,7 +76,7 @@ class CameraInput:
         self._unmatched = 0
         node.subscription(TransformStamped, '<camera>/extrinsics', self._on_extrinsics,
                           f'{name}/extrinsics')
-        self._reliable: bool | None = None
+        self._subscribed: tuple[bool, str] | None = None    # reliability, topic of the images
         self._subscriptions: dict[str, Subscription] = {}   # by topic, as in `topics`
         node.owned(lambda _: self._unsubscribe(), None)
         self.adapt_reliability()
@@ -83,22 +89,32 @@ class CameraInput:
     # Reliability.
 
     def adapt_reliability(self) -> None:
-        """Subscribe again if what the publishers offer demands another reliability."""
+        """Subscribe again if what the publishers offer demands another QoS or transport."""
+        kind, source, on_image = self._transport()
         wanted = {'reliable': True, 'best_effort': False}.get(self.node.config.image_reliability)
         if wanted is None:
             wanted = auto_reliability(
-                [info.qos_profile.reliability for topic in self.topics
+                [info.qos_profile.reliability for topic in (source, self.topics.info)
                  for info in self.node.get_publishers_info_by_topic(topic)])
-        if wanted == self._reliable:
+        if (wanted, source) == self._subscribed:
             return
         self._unsubscribe()
-        self._reliable = wanted
-        for kind, topic, row, callback in (
-                (CameraInfo, self.topics.info, OURS.info, self._on_info),
-                (Image, self.topics.image, OURS.image, self._on_image)):
-            self._subscriptions[topic] = self.node.create_subscription(
-                kind, topic, self.node.guarded(callback), qos(row, wanted),
+        self._subscribed = wanted, source
+        for role, topic, form, row, callback in (
+                (self.topics.info, self.topics.info, CameraInfo, OURS.info, self._on_info),
+                (self.topics.image, source, kind, OURS.image, on_image)):
+            self._subscriptions[role] = self.node.create_subscription(
+                form, topic, self.node.guarded(callback), qos(row, wanted),
                 qos_overriding_options=overridable(reliability=False))
+
+    def _transport(self) -> tuple[type, str, Callable[[Any], None]]:
+        """Return (type, topic, callback) of the images: compressed only where nothing else is."""
+        raw = self.topics.image
+        packed = f'{self.node.resolve_topic_name(raw)}/compressedDepth'
+        if not self.node.get_publishers_info_by_topic(raw) and (
+                self.node.get_publishers_info_by_topic(packed)):
+            return CompressedImage, packed, self._on_compressed
+        return Image, raw, self._on_image
 
     def _unsubscribe(self) -> None:
         while self._subscriptions:
@@ -118,6 +134,17 @@ class CameraInput:
         if stamp == self._unmatched:
             self._unmatched = 0     # it was only late
         self._match(stamp)
+
+    def _on_compressed(self, message: CompressedImage) -> None:
+        self.heard = time.monotonic()
+        if not self.node.active:
+            return
+        try:
+            encoding, pixels = decode_compressed_depth(message.format, bytes(message.data))
+        except HoocError as error:
+            self.node.diagnostics.error(self.name, 'bad_image', f'{error}; the image is dropped')
+            return
+        self._on_image(image_message(pixels, encoding, message.header))
 
     def _on_image(self, message: Image) -> None:
         self.heard = time.monotonic()
@@ -213,7 +240,9 @@ class CameraInput:
                 f'the extrinsics of {self.name} are given in frame '
                 f'{self._latched.header.frame_id!r}, but target_frame is {target!r}; set '
                 'target_frame to the former; the image is dropped')
+        nameless = '' if frame else 'its images carry no frame_id and '
         raise HoocError(
-            f'nobody says where {self.name} stands: publish {self.name}/extrinsics or /tf_static '
-            f"({target} to {frame or 'the camera'}), or set parameter extrinsics.{self.name}; "
+            f'{nameless}nobody says where {self.name} stands: publish {self.name}/extrinsics '
+            f"or /tf_static ({target} to {frame or 'the camera'}), or set parameter "
+            f'extrinsics.{self.name}; '
             'of its images only the latest waits for that')

@@ -18,7 +18,9 @@ from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.fusion import Fusion
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
+from hooc_perception.io.camera_info import SizeMismatch
 from hooc_perception.io.depth_units import depth_unit_error
+from hooc_perception.ros.inputs.image_notes import ImageNotes
 from hooc_perception.ros.messages.conversions import (
     camera_from_messages,
     depth_from_message,
@@ -65,9 +67,13 @@ class RawFrames:
     :ivar camera: the Camera of the last good frame, None before.
     """
 
-    def __init__(self, name: str) -> None:
-        """Begin without any frame of the camera of that name."""
-        self.name = name
+    def __init__(self, name: str, stated: Callable[[], ImageNotes] = ImageNotes) -> None:
+        """
+        Begin without any frame of the camera of that name.
+
+        :param stated: returns what the user states of its images, as it is now.
+        """
+        self.name, self._stated = name, stated
         self.camera: Camera | None = None
         # The last Camera, and the content of the messages that it was built from.
         self._known: tuple[tuple[Any, ...], Camera] | None = None
@@ -83,15 +89,11 @@ class RawFrames:
         :raises FrameRefused: with the code `bad_calibration`, `bad_extrinsics`,
             `absurd_extrinsics`, `bad_image`, `size_mismatch`, `wrong_unit` or `no_readings`.
         """
-        camera = self._camera(info, transform)
+        stated = self._stated()
+        camera = self._camera(image, info, transform, bool(stated.rectified))
         if config.table == 'fixed':
             _refuse('absurd_extrinsics', pose_trouble(camera), f'camera {self.name}: ')
-        depth = _refusing('bad_image', depth_from_message, image)
-        if depth.shape != (camera.height, camera.width):
-            raise FrameRefused(
-                'size_mismatch', f'the depth image of camera {self.name} is {image.width} x '
-                f'{image.height} pixels, but its camera_info is for {camera.width} x '
-                f'{camera.height}; publish both at the same resolution')
+        depth = _refusing('bad_image', depth_from_message, image, stated.depth_unit)
         _refuse('wrong_unit', depth_unit_error(depth, image.encoding, config.max_depth_m))
         _refuse('no_readings', reading_trouble(depth))
         if self.camera is not None and not same_calibration(camera, self.camera):
@@ -127,15 +129,22 @@ class RawFrames:
         hidden = None if frame.hidden is None else frame.hidden & np.isnan(depth)
         return DepthView(frame.camera, depth, hidden), count
 
-    def _camera(self, info: CameraInfo, transform: TransformStamped) -> Camera:
-        """Return the Camera of two messages; the same object while they say the same."""
-        key = (info.width, info.height, info.k.tobytes(), tuple(info.d), info.distortion_model,
+    def _camera(self, image: Image, info: CameraInfo, transform: TransformStamped,
+                rectified: bool) -> Camera:
+        """Return the Camera of three messages; the same object while they say the same."""
+        size = image.width, image.height
+        key = (*size, info.width, info.height, info.k.tobytes(), info.p.tobytes(), tuple(info.d),
+               info.distortion_model, info.binning_x, info.binning_y, str(info.roi), rectified,
                str(transform.transform))
         if self._known and key == self._known[0]:
             return self._known[1]
-        unmoved = TransformStamped()
-        _refusing('bad_calibration', camera_from_messages, self.name, info, unmoved)
-        camera = _refusing('bad_extrinsics', camera_from_messages, self.name, info, transform)
+        try:
+            camera_from_messages(self.name, info, TransformStamped(), size, rectified)
+        except HoocError as error:
+            raise FrameRefused('size_mismatch' if isinstance(error, SizeMismatch)
+                               else 'bad_calibration', _short(error)) from error
+        camera = _refusing('bad_extrinsics', camera_from_messages, self.name, info, transform,
+                           size, rectified)
         self._known = key, camera
         return camera
 
@@ -145,7 +154,12 @@ def _refusing(code: str, function: Callable[..., T], *args: Any) -> T:
     try:
         return function(*args)
     except HoocError as error:
-        raise FrameRefused(code, textwrap.shorten(str(error), 500, placeholder=' ...')) from error
+        raise FrameRefused(code, _short(error)) from error
+
+
+def _short(error: HoocError) -> str:
+    """Return the sentence of an error at a limited length."""
+    return textwrap.shorten(str(error), 500, placeholder=' ...')
 
 
 def _refuse(code: str, trouble: str | None, before: str = '') -> None:

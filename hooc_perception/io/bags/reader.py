@@ -84,7 +84,6 @@ class BagScene(TableFrameScene):
         self.table_known: bool = wanted is not None
         world = plain(wanted or contents.tree.root(next(iter(frames.values()))))
         self.world_frame: str = world
-        # Metres per count, as stated or by the encoding.
         self._units = {name: self.depth_unit(name) or encoded_unit(image.encoding)
                        for name, image in firsts.items()}
         self.source_cameras: tuple[Camera, ...] = tuple(
@@ -131,7 +130,7 @@ class BagScene(TableFrameScene):
         if self.table_known:
             check_aim(self.cameras, self.path)
             check_unit(chosen, [f'{self.path}: {topic}' for topic in self.depth_topics.values()],
-                       [self._units[name] for name in self.depth_topics], _UNIT_FIX)
+                       list(self._units.values()), _UNIT_FIX)
         return tuple(replace(view, camera=camera)
                      for view, camera in zip(chosen, self.cameras))
 

@@ -4,6 +4,7 @@
 
 import ast
 from pathlib import Path
+import subprocess
 import sys
 import tomllib
 from xml.etree import ElementTree
@@ -122,3 +123,23 @@ def test_no_source_needs_more_than_ubuntu_24_04_has():
     assert len(sources) > 200
     assert {str(path.relative_to(ROOT)): found for path in sources
             if (found := newer_than_ubuntu(path.read_text()))} == {}
+
+
+def test_launch_files_need_nothing_from_pypi():
+    """`ros2 launch` runs in the Python of the system, which lacks what the environment has."""
+    modules = set()
+    for path in (ROOT / 'launch').glob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and node.module.startswith('hooc_perception'):
+                modules.add(node.module)
+                modules |= {f'{node.module}.{alias.name}' for alias in node.names if (
+                    ROOT / node.module.replace('.', '/') / f'{alias.name}.py').is_file()}
+    assert 'hooc_perception.chain' in modules
+    code = ('import importlib, sys; before = set(sys.modules)\n'
+            f'for name in {sorted(modules)}: importlib.import_module(name)\n'
+            'print(*{name.partition(".")[0] for name in set(sys.modules) - before})')
+    run = subprocess.run([sys.executable, '-c', code], cwd=ROOT, check=True, text=True,
+                         capture_output=True)
+    found = set(run.stdout.split())
+    assert 'hooc_perception' in found
+    assert sorted(found & ({*KEYS, *WITHOUT_KEY, *OPTIONAL} - {'yaml'})) == []

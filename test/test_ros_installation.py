@@ -85,7 +85,7 @@ def test_the_requirements_next_to_ros_are_those_of_the_project():
 
 
 @pytest.mark.parametrize('name, version', [
-    ('numpy', '1.26.4'), ('scipy', '1.11.4'), ('opencv-contrib-python-headless', '4.6.0'),
+    ('numpy', '1.26.4'), ('opencv-contrib-python-headless', '4.6.0'),
     ('networkx', '2.8.8'), ('matplotlib', '3.6.3'), ('joblib', '1.3.2'), ('pillow', '10.2.0'),
     ('scikit-learn', '1.4.1'), ('PyYAML', '6.0.1'), ('Jinja2', '3.1.2'), ('psutil', '5.9.8'),
     ('tqdm', '4.66.2')])

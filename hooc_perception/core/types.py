@@ -325,6 +325,8 @@ class ParsedScene:
     :ivar unknown: things of no category, see core.parsing.unknown.
     :ivar converged: False where a deadline ended the search.
     :ivar seconds: wall time of each stage.
+    :ivar hidden_s: (n,) float32, seconds since an object that the robot hides was last seen; 0 for
+        objects that were found. None = all were found.
     """
 
     objects: Candidates
@@ -339,6 +341,7 @@ class ParsedScene:
     sigma_t: Float32Array | None = None
     sigma_r: Float32Array | None = None
     unknown: UnknownObjects = field(default_factory=UnknownObjects.empty)
+    hidden_s: Float32Array | None = None
 
     def take(self, index: 'AnyArray') -> 'ParsedScene':
         """Return the scene with those objects that a bool mask names; its energy stays."""

@@ -14,6 +14,7 @@ from hooc_perception.chain import PARSING
 from hooc_perception.core.config import param
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import inverse
+from hooc_perception.core.parsing.hidden_objects import HiddenObjects
 from hooc_perception.core.parsing.tracking import TrackConfig, Tracker
 from hooc_perception.core.parsing.unexplained import unexplained_points
 from hooc_perception.core.types import (
@@ -116,6 +117,7 @@ class Parsing:
                                  node.config.sigmas)
         warmed(node, model, self._try_out)
         self._tracker = Tracker(model.models, node.config)
+        self._hidden = HiddenObjects(model.models, node.config, self._parser.max_instances)
         self.output = ObjectOutput(node, model.models, mesh_uris(model))
         self.input = ViewInput(node, camera_names(node, model), 'parse', {
             'probabilities': (PointCloud2, 'pixels/probabilities'),
@@ -155,10 +157,14 @@ class Parsing:
         """Parse one frame set and publish the result."""
         node, start = self._node, time.monotonic()
         parsed, frame = self._parsed(observation, messages), node.config.target_frame
-        self._tracker.config = node.config
+        self._tracker.config = self._hidden.config = node.config
         ids, objects = self._tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
-        left = unexplained_points(observation.in_target_frame(), objects, self.models)
+        observation = observation.in_target_frame()
+        left = unexplained_points(observation, objects, self.models)
+        found = len(ids)
+        parsed, ids = self._hidden.update(stamp_ns, parsed, ids, observation)
+        self._tracker.hold(ids, stamp_ns)
         scene = detected_scene(parsed, ids, self.models, stamp_ns, frame,
                                self._tracker.update_unknown(stamp_ns, parsed.unknown))
         age_s = (node.now_ns() - stamp_ns) * 1e-9
@@ -167,11 +173,13 @@ class Parsing:
         publish_all(node, self.adapters, scene)
         node.detect.answer(scene)
         node.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
-                            energy=float(parsed.energy.total), age_s=age_s)
+                            hidden=len(ids) - found, age_s=age_s,
+                            energy=float(parsed.energy.total))
 
     def retract(self) -> None:
         """Publish that nothing is known any more; objects that return in time keep their ids."""
         self._answered = None
+        self._hidden.forget()
         now = self._node.now_ns(), self._node.config.target_frame
         self.output.clear(*now)
         clear_all(self._node, self.adapters, *now)
@@ -195,6 +203,7 @@ class Parsing:
         """Forget what waits to be joined and what was seen; retract the last result."""
         self.input.clear()
         self._tracker.forget()
+        self._hidden.forget()
         if self._node.active:
             self.retract()
         response.success, response.message = True, json.dumps({'objects': 0})

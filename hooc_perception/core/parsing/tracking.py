@@ -27,6 +27,9 @@ class TrackConfig(Config):
                                'new ids.', 's', 0.0, 3600.0, runtime=True)
     track_reach_m: float = param(0.15, 'An object that moved farther than this gets a new id.',
                                  'm', 0.001, 10.0, runtime=True)
+    keep_hidden_s: float = param(
+        300.0, 'An object that the robot hides stays in the results with flag 8, as it was last '
+        'seen, for at most this time; 0: it is missing.', 's', 0.0, 86400.0, runtime=True)
 
 
 @dataclass
@@ -62,6 +65,12 @@ class Tracker:
     def forget(self) -> None:
         """Forget all objects; their ids are not used again."""
         self._tracks, self._things, self._last_ns = {}, {}, None
+
+    def hold(self, ids: UInt32Array, stamp_ns: int) -> None:
+        """Let the time of objects that are known to be there, though hidden, begin anew."""
+        for number in ids.tolist():
+            if number in self._tracks:
+                self._tracks[number].stamp_ns = stamp_ns
 
     def update(self, stamp_ns: int, objects: Candidates) -> tuple[UInt32Array, Candidates]:
         """

@@ -39,6 +39,7 @@ Meshes = Sequence[tuple[str, str]]
 FLAG_SEARCH_STOPPED = 1     # a deadline ended the search before it converged
 FLAG_ONE_VIEW = 2           # only one camera sees the object
 FLAG_TURNED = 4             # rotated by half a turn it would fit the images about as well
+FLAG_HIDDEN = 8             # the robot hides it: it is as it was last seen, age_s ago
 
 
 def probabilities_message(probabilities: PixelProbabilities, observation: Observation,
@@ -159,7 +160,7 @@ def objects_messages(parsed: ParsedScene, ids: Sequence[int] | AnyArray, age_s: 
     Return (PoseArray, PointCloud2) of a ParsedScene: `objects/poses` and `objects/attributes`.
 
     :param ids: (n,) uint32 instance ids.
-    :param age_s: seconds from the stamp of the frame set to now.
+    :param age_s: seconds from the stamp of the frame set to now; hidden objects are older.
     """
     objects = parsed.objects
     rows = np.zeros(len(objects), row_dtype(OBJECT_COLUMNS))
@@ -175,10 +176,11 @@ def objects_messages(parsed: ParsedScene, ids: Sequence[int] | AnyArray, age_s: 
     # NaN where it was not estimated: a zero would claim perfection.
     rows['sigma_t'] = np.nan if parsed.sigma_t is None else parsed.sigma_t
     rows['sigma_r'] = np.nan if parsed.sigma_r is None else parsed.sigma_r
-    rows['age_s'] = age_s
+    hidden_s = np.zeros(len(objects)) if parsed.hidden_s is None else parsed.hidden_s
+    rows['age_s'] = age_s + hidden_s
     rows['flags'] = (0 if parsed.converged else FLAG_SEARCH_STOPPED) | np.where(
         parsed.n_views == 1, FLAG_ONE_VIEW, 0) | np.where(
-        rows['sigma_r'] > 3.1, FLAG_TURNED, 0)
+        rows['sigma_r'] > 3.1, FLAG_TURNED, 0) | np.where(hidden_s > 0, FLAG_HIDDEN, 0)
     return (pose_array_message(objects.translation, objects.rotation_xyzw, head),
             cloud_message(rows, head))
 

@@ -119,7 +119,8 @@ def scene_json(scene: DetectedScene) -> str:
         'objects': [{'id': o.id, 'category': o.category, 'member': o.member, 'score': o.score,
                      'translation': o.translation.tolist(),
                      'rotation_xyzw': o.rotation_xyzw.tolist(), 'size': o.size.tolist(),
-                     'sigma_t': _or_none(o.sigma_t), 'sigma_r': _or_none(o.sigma_r)}
+                     'sigma_t': _or_none(o.sigma_t), 'sigma_r': _or_none(o.sigma_r),
+                     'hidden_s': o.hidden_s}
                     for o in scene.objects],
         'unknown': [{'id': u.id, 'score': _or_none(u.score), 'translation': u.translation.tolist(),
                      'rotation_xyzw': u.rotation_xyzw.tolist(), 'size': u.size.tolist()}

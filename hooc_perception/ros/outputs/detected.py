@@ -30,6 +30,7 @@ class DetectedObject:
     :ivar sigma_t: metres within which 68 % of the errors lie, NaN = not estimated.
     :ivar sigma_r: the same for the rotation, radians.
     :ivar model: that mesh.
+    :ivar hidden_s: seconds since it was last seen, because the robot hides it; 0 = it was found.
     """
 
     id: int
@@ -42,6 +43,7 @@ class DetectedObject:
     sigma_t: float
     sigma_r: float
     model: GenericModel
+    hidden_s: float = 0.0
 
     @property
     def category(self) -> str:
@@ -110,7 +112,8 @@ def detected_scene(parsed: ParsedScene, ids: AnyArray, models: Sequence[GenericM
     return DetectedScene(stamp_ns, frame, tuple(
         DetectedObject(int(ids[i]), int(found.category[i]), int(found.member[i]),
                        float(found.score[i]), found.translation[i], found.rotation_xyzw[i],
-                       found.size[i].astype(float), float(sigma_t[i]), float(sigma_r[i]), model)
+                       found.size[i].astype(float), float(sigma_t[i]), float(sigma_r[i]), model,
+                       0.0 if parsed.hidden_s is None else float(parsed.hidden_s[i]))
         for i, model in enumerate(found.shapes(models))), tuple(
             DetectedUnknown(int(number), *row) for number, *row in zip(
                 () if unknown_ids is None else unknown_ids, parsed.unknown.score.tolist(),

@@ -9,7 +9,7 @@ import json
 from geometry_msgs.msg import Pose, PoseArray
 from hooc_perception.chain import topic_token
 from hooc_perception.core.arrays import AnyArray
-from hooc_perception.core.types import Candidates, GenericModel, ParsedScene
+from hooc_perception.core.types import GenericModel, ParsedScene
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, pose_array_message, pose_message
 from hooc_perception.ros.messages.point_clouds import cloud_message, row_dtype
@@ -78,7 +78,7 @@ class ObjectOutput:
             publisher.publish(pose_array_message(mine.translation, mine.rotation_xyzw, head))
         self._unknown_attributes.publish(unknown_attributes)
         self._unknown.publish(unknown_poses)
-        self._markers.publish(self._markers_message(list(poses.poses), found, scene))
+        self._markers.publish(self._markers_message(list(poses.poses), parsed, scene))
         self._unexplained.publish(points_message(unexplained, head))
         self._summary.publish(String(data=summary_json(parsed, scene.stamp_ns)))
         self._poses.publish(poses)
@@ -105,10 +105,11 @@ class ObjectOutput:
         gone, self._shown = sorted(self._shown - now), now
         return [Marker(header=head, ns=ns, id=number, action=Marker.DELETE) for ns, number in gone]
 
-    def _markers_message(self, poses: Sequence[Pose], found: Candidates,
+    def _markers_message(self, poses: Sequence[Pose], parsed: ParsedScene,
                          scene: DetectedScene) -> MarkerArray:
         """Return DELETE for the markers of objects that are gone, ADD for the current ones."""
-        head = scene.header
+        head, found = scene.header, parsed.objects
+        hidden = np.zeros(len(found)) if parsed.hidden_s is None else parsed.hidden_s
         markers = self._deleted({(o.category, o.id) for o in scene.objects}
                                 | {(UNKNOWN, u.id) for u in scene.unknown}, head)
         for i, (number, model) in enumerate(zip((o.id for o in scene.objects),
@@ -121,7 +122,7 @@ class ObjectOutput:
             marker.scale.x, marker.scale.y, marker.scale.z = (float(s) for s in scale)
             hue = class_id * 0.618034 % 1.0     # golden ratio: adjacent ids differ
             marker.color.r, marker.color.g, marker.color.b = colorsys.hsv_to_rgb(hue, 0.6, 0.95)
-            marker.color.a = 0.8
+            marker.color.a = 0.3 if hidden[i] > 0 else 0.8
             markers.append(marker)
         markers += [box_marker(u, head) for u in scene.unknown]
         return MarkerArray(markers=markers)

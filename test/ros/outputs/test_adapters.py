@@ -224,6 +224,25 @@ def test_what_is_gone_leaves_the_planning_scene_after_its_time(stubs, scene):
     assert len(node.sent['/planning_scene']) == 4
 
 
+def test_hidden_objects_stay_in_the_planning_scene_in_another_colour(stubs, scene):
+    stubs.install('moveit_msgs')
+    node = Node(planning_scene='box', planning_scene_ttl_s=5.0)
+    adapter, = adapters_of(node)
+    box, can = scene.objects
+    adapter.publish(scene)
+    for seconds in (4, 8, 12):
+        node.now += 4 * 10 ** 9
+        adapter.publish(replace(scene, stamp_ns=node.now, objects=(
+            box, replace(can, hidden_s=float(seconds)))))
+    node.now += 10 ** 9
+    adapter.publish(replace(scene, stamp_ns=node.now))
+    assert told(stubs, node) == [[('tea_box_7', 0), ('can_9', 0)]] * 5
+    colors = [[(c.id, c.color.a) for c in m.object_colors] for m in node.sent['/planning_scene']]
+    assert colors[0] == [] and colors[1] == colors[3] and colors[4] == [('can_9', 1.0)]
+    (name, alpha), = colors[1]
+    assert name == 'can_9' and alpha < 0.9
+
+
 def test_at_once_on_clear_and_when_time_was_set_back(stubs, scene):
     stubs.install('moveit_msgs')
     node = Node(planning_scene='box', planning_scene_ttl_s=0.0)

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The objects as collision objects in the planning scene of MoveIt."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from geometry_msgs.msg import Point, PolygonStamped, Pose
@@ -19,9 +19,13 @@ from hooc_perception.ros.outputs.detected import (
 import numpy as np
 from scipy.spatial import ConvexHull
 from shape_msgs.msg import Mesh, MeshTriangle, SolidPrimitive
-from std_msgs.msg import Header
+from std_msgs.msg import ColorRGBA, Header
 
 CHECK_S = 0.5
+Color = tuple[float, float, float, float]      # red, green, blue, opacity
+# Objects that the robot hides; and the colour that MoveIt itself gives to objects.
+HIDDEN: Color = (0.5, 0.5, 0.5, 0.4)
+SEEN: Color = (0.0, 0.8, 0.0, 1.0)
 # The slab of the table lies so far below the surface, and is so thick: an object that stands on
 # the table, once attached to a gripper, should not count as a collision.
 TABLE_GAP_M, TABLE_THICKNESS_M = 0.005, 0.03
@@ -31,8 +35,9 @@ class PlanningSceneDiffs:
     """
     Publish diffs on /planning_scene: ADD for detected objects, REMOVE for those that are gone.
 
-    An object that is missing from a result may be hidden, perhaps by the robot: it stays for
-    `planning_scene_ttl_s`. Without any results, all objects are removed after that time.
+    An object that is missing from a result may be hidden: it stays for `planning_scene_ttl_s`.
+    Objects that the robot is known to hide are in the results and stay, in the colour HIDDEN.
+    Without any results, all objects are removed after that time.
 
     The table is added as it comes on scene/table and stays: a robot must not hit it whether or
     not objects are known.
@@ -49,6 +54,7 @@ class PlanningSceneDiffs:
         # Name -> node time (ns) of the last result with the object.
         self._seen: dict[str, int] = {}
         self._frame, self._stamp_ns = '', 0     # of the last result
+        self._hidden: set[str] = set()          # names of those that are shown as hidden
         if table:
             node.subscription(PolygonStamped, 'scene/table', self._on_table)
         node.owned(node.destroy_timer, node.create_timer(CHECK_S, node.guarded(
@@ -66,7 +72,11 @@ class PlanningSceneDiffs:
                  for o in scene.objects]
         added += [unknown_object(u, scene.header, self._shape, self._messages)
                   for u in scene.unknown]
-        self._send(added, gone + self._expired(now), scene.header)
+        hidden = {o.name for o in scene.objects if o.hidden_s > 0}
+        colors = dict.fromkeys((self._hidden - hidden) & shown.keys(), SEEN) | dict.fromkeys(
+            hidden, HIDDEN)
+        self._hidden = hidden
+        self._send(added, gone + self._expired(now), scene.header, colors)
 
     def _on_table(self, outline: PolygonStamped) -> None:
         """Add the table, or replace it where it was."""
@@ -94,18 +104,20 @@ class PlanningSceneDiffs:
             del self._seen[name]
         return names
 
-    def _send(self, added: Sequence[Any], removed: Sequence[str], head: Header) -> None:
+    def _send(self, added: Sequence[Any], removed: Sequence[str], head: Header,
+              colors: Mapping[str, Color] | None = None) -> None:
         if added or removed:
-            self._publisher.publish(diff_message(added, removed, head, self._messages))
+            self._publisher.publish(diff_message(added, removed, head, self._messages, colors))
 
 
 def diff_message(added: Sequence[Any], removed: Sequence[str], head: Header,
-                 messages: Any) -> Any:
+                 messages: Any, colors: Mapping[str, Color] | None = None) -> Any:
     """
     Return the PlanningScene diff that adds CollisionObjects and removes others.
 
     :param removed: names of objects.
     :param messages: the module moveit_msgs.msg.
+    :param colors: {name of an object: its colour from now on}.
     """
     kind = messages.CollisionObject
     scene = messages.PlanningScene(is_diff=True)
@@ -113,6 +125,9 @@ def diff_message(added: Sequence[Any], removed: Sequence[str], head: Header,
     scene.robot_state.is_diff = True
     scene.world.collision_objects = [
         kind(header=head, id=name, operation=kind.REMOVE) for name in removed] + [*added]
+    scene.object_colors = [
+        messages.ObjectColor(id=name, color=ColorRGBA(r=r, g=g, b=b, a=a))
+        for name, (r, g, b, a) in sorted((colors or {}).items())]
     return scene
 
 

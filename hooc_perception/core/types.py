@@ -345,12 +345,12 @@ class ParsedScene:
 
     def take(self, index: 'AnyArray') -> 'ParsedScene':
         """Return the scene with those objects that a bool mask names; its energy stays."""
-        sigmas = (None if sigma is None else sigma[index]
-                  for sigma in (self.sigma_t, self.sigma_r))
-        return ParsedScene(
-            self.objects.take(index), self.energy, self.visible_ratio[index],
-            self.residual_m[index], self.energy_delta[index], self.n_views[index], self.pool,
-            self.converged, self.seconds, *sigmas, self.unknown)
+        sigma_t, sigma_r, hidden_s = (None if values is None else values[index] for values in (
+            self.sigma_t, self.sigma_r, self.hidden_s))
+        return replace(
+            self, objects=self.objects.take(index), visible_ratio=self.visible_ratio[index],
+            residual_m=self.residual_m[index], energy_delta=self.energy_delta[index],
+            n_views=self.n_views[index], sigma_t=sigma_t, sigma_r=sigma_r, hidden_s=hidden_s)
 
     def moved(self, T_to_from: Float64Array | None) -> 'ParsedScene':
         """Return the same in another frame, by a rigid (4, 4); None = the same frame."""

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hooc_perception.core.arrays import Float32Array, Float64Array, UInt8Array
 from hooc_perception.core.geometry import matrix_from_pose, pose_from_matrix
+from hooc_perception.core.segment.hidden import with_hidden
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.io.scenes import png
 from hooc_perception.io.scenes.plausible import check_aim, check_distances, check_unit
@@ -64,6 +65,7 @@ class RecordedScene(TableFrameScene):
     :ivar source_strangers: things of none of the set's categories that stand there, their names
         as `category`; None for scenes where nobody noted them.
     :ivar label_files: {camera name: 8-bit PNG of instance labels}, where there are any.
+    :ivar mask_files: {camera name: 8-bit PNG, not black where the robot hides the scene}.
     """
 
     name: str
@@ -74,6 +76,7 @@ class RecordedScene(TableFrameScene):
     label_files: dict[str, Path] = field(default_factory=dict)
     table_known: bool = True
     source_strangers: tuple[TrueObject, ...] | None = None
+    mask_files: dict[str, Path] = field(default_factory=dict)
 
     @property
     def truth(self) -> tuple[TrueObject, ...] | None:
@@ -91,7 +94,7 @@ class RecordedScene(TableFrameScene):
 
         :raises HoocError: as `depth`, but for what only a table's frame tells.
         """
-        views = tuple(DepthView(camera, depth)
+        views = tuple(self._view(camera, depth)
                       for camera, depth in zip(self.source_cameras, self._depth_images))
         check_distances(views, self.depth_files, self.depth_units)
         return views
@@ -123,6 +126,13 @@ class RecordedScene(TableFrameScene):
         if things is None or self.table is None:
             return things
         return tuple(_moved(self.table.T_table_source, true) for true in things)
+
+    def _view(self, camera: Camera, depth: Float32Array) -> DepthView:
+        """Return the DepthView of a camera, without what its mask covers."""
+        view, path = DepthView(camera, depth), self.mask_files.get(camera.name)
+        if path is None:
+            return view
+        return with_hidden(view, png.read_png(path, camera.width, camera.height, 8) > 0)
 
     @property
     def _depth_images(self) -> tuple[Float32Array, ...]:

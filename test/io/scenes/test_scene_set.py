@@ -3,6 +3,8 @@
 """Scene sets: what is written is read back, and the sets beside the repository are read."""
 
 from hooc_perception.core.types import Camera
+from hooc_perception.errors import HoocError
+from hooc_perception.io.scenes.png import write_png
 from hooc_perception.io.scenes.scene_set import (
     load_scene_set,
     NewScene,
@@ -155,3 +157,17 @@ def test_the_sets_beside_the_repository(shared_scenes, folder, scenes, truth):
     assert (scene.labels() is None) == truth
     for view in scene.depth():
         assert 0.3 < np.nanmedian(view.depth) < 3
+
+
+def test_what_a_mask_image_covers_is_hidden(written):
+    path, cameras, scenes = written
+    mask = np.zeros((30, 40), np.uint8)
+    mask[5:9, 10:20] = 200
+    write_png(path / 'scenes' / 'a' / 'left_mask.png', mask)
+    left, right = load_scene_set(path).scenes[0].depth()
+    np.testing.assert_array_equal(left.hidden, mask > 0)
+    assert np.isnan(left.depth[mask > 0]).all() and right.hidden is None
+    np.testing.assert_allclose(left.depth[mask == 0], scenes[0].depth[0][mask == 0], atol=1e-6)
+    write_png(path / 'scenes' / 'a' / 'left_mask.png', mask[:-1])
+    with pytest.raises(HoocError, match='left_mask.png: the image has 40 x 29 pixels'):
+        load_scene_set(path).scenes[0].depth()

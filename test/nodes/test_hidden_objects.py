@@ -24,7 +24,9 @@ from visualization_msgs.msg import MarkerArray  # noqa: E402
 
 def test_a_hidden_object_keeps_its_id_and_is_flagged(bench, make_chain, folder, tmp_path):
     # On a busy machine, minutes lie between two frame sets.
-    stages, send = make_chain(parameters={3: {'track_ttl_s': 3600.0, 'keep_hidden_s': 3600.0}})
+    stages, send = make_chain(parameters={
+        0: {'max_frame_age_s': 0.0, 'wait_for_answer_s': 0.0},
+        3: {'track_ttl_s': 3600.0, 'keep_hidden_s': 3600.0}})
     camera, truth = overhead_camera(), stages.candidates
     mask = np.zeros((camera.height, camera.width), np.uint8)
     can = folder.models[2]

@@ -72,6 +72,7 @@ def _procedural(k: int) -> tuple[trimesh.Trimesh, list[Float64Array]]:
     rng = stage_rng(0, 'stranger', k)
     parts = MAKERS[k % len(MAKERS)](rng)
     whole = trimesh.util.concatenate(parts)
+    assert isinstance(whole, trimesh.Trimesh)
     longest = np.exp(rng.uniform(np.log(SMALLEST_M), np.log(LARGEST_M)))
     scale, middle = longest / whole.extents.max(), whole.bounds.mean(0)
     for part in (whole, *parts):
@@ -123,7 +124,7 @@ def _primitive(rng: np.random.Generator, longest: float) -> trimesh.Trimesh:
             trimesh.creation.cone(sides[0] / 2, sides[1]))[kind]
     T = np.eye(4)
     if rng.random() < 0.5:
-        T[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+        T[:3, :3] = Rotation.random(None, rng).as_matrix()
     return part.apply_transform(T)
 
 

@@ -94,7 +94,7 @@ def test_every_parameter_says_what_it_means_and_its_default_is_allowed(name, sta
         assert type(f.default) in (float, int, bool, str), parameter
         assert isinstance(f.metadata['runtime'], bool)
         if isinstance(f.default, str):
-            assert f.default in f.metadata['choices'], parameter
+            assert f.default in (f.metadata['choices'] or [f.default]), parameter
         elif not isinstance(f.default, bool):
             assert f.metadata['low'] is not None, f'{parameter} has no lower bound'
             with pytest.raises(HoocError, match=f'parameter {parameter} '):

@@ -15,7 +15,7 @@ from hooc_perception.core.types import Candidates, Observation, UnknownObjects
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree, ConvexHull, QhullError
+from scipy.spatial import ConvexHull, KDTree, QhullError
 from scipy.spatial.transform import Rotation
 
 # A pixel is explained where the composed depth of all objects is so near to the measured one.
@@ -47,7 +47,8 @@ def find_unknown(frame: Frame, objects: Candidates) -> UnknownObjects:
         return UnknownObjects.empty()
     cells, member = np.unique(np.floor(cloud.points[left] / CELL_M).astype(np.int64), axis=0,
                               return_inverse=True)
-    group = _groups((cells + 0.5) * CELL_M)[member.ravel()]
+    middles: Float64Array = (cells + 0.5) * CELL_M
+    group = _groups(middles)[member.ravel()]
     boxes, scores, hulls = [], [], []
     for k in range(group.max() + 1):
         mine = left[group == k]
@@ -91,14 +92,14 @@ def _near(points: Float64Array, objects: Candidates, frame: Frame) -> BoolArray:
         scale = objects.size[i] / np.maximum(model.extents, 1e-9)
         T = matrix_from_pose(objects.translation[i], objects.rotation_xyzw[i])
         surfaces.append(transform(T, model.surface_points * scale))
-    return cKDTree(np.concatenate(surfaces)).query(
+    return KDTree(np.concatenate(surfaces)).query(
         points, distance_upper_bound=RESIDUE_M)[0] < np.inf
 
 
 def _groups(points: Float64Array) -> Int64Array:
     """Return (n,) numbers of the connected groups of points; those above each other are one."""
-    pairs = cKDTree(points).query_pairs(REACH_M, output_type='ndarray')
-    above = cKDTree(points[:, :2]).query_pairs(0.75 * CELL_M, output_type='ndarray')
+    pairs = KDTree(points).query_pairs(REACH_M, output_type='ndarray')
+    above = KDTree(points[:, :2]).query_pairs(0.75 * CELL_M, output_type='ndarray')
     pairs = np.concatenate([pairs, above])
     graph = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(points),) * 2)
     return connected_components(graph, directed=False)[1].astype(np.int64)

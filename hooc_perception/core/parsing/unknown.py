@@ -47,7 +47,7 @@ def find_unknown(frame: Frame, objects: Candidates) -> UnknownObjects:
         return UnknownObjects.empty()
     cells, member = np.unique(np.floor(cloud.points[left] / CELL_M).astype(np.int64), axis=0,
                               return_inverse=True)
-    middles: Float64Array = (cells + 0.5) * CELL_M
+    middles = ((cells + 0.5) * CELL_M).astype(np.float64)
     group = _groups(middles)[member.ravel()]
     boxes, scores, hulls = [], [], []
     for k in range(group.max() + 1):

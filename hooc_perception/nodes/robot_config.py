@@ -39,7 +39,8 @@ class RobotConfig(Config):
         0.0, 60.0, runtime=True)
     robot_unposed: str = param(
         'refuse', 'What happens to a frame set while nobody says where the robot is: refuse drops '
-        'it with a reason; accept uses it as it is, and the robot is taken for objects.',
+        'it with a reason, once the robot has been masked or where robot_description or '
+        'robot_pose is given; accept uses it as it is, and the robot is taken for objects.',
         choices=('refuse', 'accept'), runtime=True)
     max_robot_share: float = param(
         0.5, 'A frame set is refused if the robot hides more than this share of the table, over '

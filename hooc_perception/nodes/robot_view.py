@@ -58,6 +58,10 @@ class RobotView:
         self._listening = False
         self._until: float | None = None    # monotonic seconds, to wait for a state
         config: RobotConfig = node.config
+        # Whether sets are refused without a pose: somebody asked for the mask, or it has worked.
+        # A description that merely lies on /robot_description does not stop the chain.
+        self._required = bool(config.robot_description or config.robot_boxes
+                              or config.robot_pose)
         pose_numbers('robot_pose', config.robot_pose)
         self._boxes: list[trimesh.Trimesh] = _named('robot_boxes', boxes_of, config.robot_boxes)
         self._masks = MaskImages(node, names)
@@ -106,12 +110,13 @@ class RobotView:
         try:
             meshes = self._meshes(frame.stamp_ns, asker)
         except StateUnknown as error:
-            if self._node.config.robot_unposed == 'refuse':
+            if self._node.config.robot_unposed == 'refuse' and self._required:
                 raise
             self._node.diagnostics.warn('robot', error.code, f'{error}; the frame set is used as '
-                                        'it is (robot_unposed)')
+                                        'it is, and the robot is taken for objects')
             meshes = []
         if meshes:
+            self._required = True
             view = without_robot(view, meshes, self._node.config.robot_padding_px, config)
         if view.hidden is frame.hidden:
             return frame
@@ -144,6 +149,10 @@ class RobotView:
             self._read(message.data)
         except HoocError as error:
             self._robot = None
+            if isinstance(error.__cause__, ImportError):
+                self._node.diagnostics.warn('robot', 'no_urdf_reader', f'{error}; the robot is '
+                                            'taken for objects')
+                return
             self._trouble = StateUnknown('bad_robot_description', str(error))
             self._node.diagnostics.error('robot', self._trouble.code, str(error))
 

@@ -4,6 +4,7 @@
 
 import importlib.util
 from pathlib import Path
+import sys
 
 import cv2
 from hooc_perception.core.geometry import transform
@@ -158,6 +159,27 @@ def test_without_joint_states_frame_sets_are_refused(bench, arm_urdf):
     assert bench.spin(lambda: cell.segments)
     assert not cell.hidden().any()
     assert bench.reasons(cell.node)['robot'][0] == 'no_joint_state'
+
+
+def test_a_description_that_lies_on_the_topic_does_not_stop_the_chain(bench, arm_urdf):
+    cell = Cell(bench, arm_urdf, target_frame='table')
+    cell.descriptions.publish(String(data=arm_urdf))
+    assert bench.spin(cell.joints.get_subscription_count)
+    cell.look(S)
+    assert bench.spin(lambda: cell.segments)
+    assert not cell.hidden().any() and not cell.refused
+    code, sentence = bench.reasons(cell.node)['robot']
+    assert code.startswith('no_') and 'taken for objects' in sentence
+
+
+def test_without_a_reader_of_urdf_the_topic_is_a_warning(bench, arm_urdf, monkeypatch):
+    monkeypatch.setitem(sys.modules, 'hooc_perception.robot.description', None)
+    cell = Cell(bench, arm_urdf)
+    cell.descriptions.publish(String(data=arm_urdf))
+    assert bench.spin(lambda: bench.reasons(cell.node).get('robot', ('',))[0] == 'no_urdf_reader')
+    cell.look(S)
+    assert bench.spin(lambda: cell.segments)
+    assert not cell.refused
 
 
 def test_a_joint_state_that_is_too_old_is_not_used(bench, arm_urdf):

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Drivers of depth cameras as they are, for tests of the ingestion node."""
 
+from dataclasses import replace
+
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.core.geometry import matrix_from_pose
 from hooc_perception.core.types import Camera
@@ -20,6 +22,14 @@ def a_camera(name):
     K = np.array([[60.0, 0, 31.2], [0, 61.0, 23.4], [0, 0, 1]])
     return Camera(name, W, H, K, np.array([0.08, -0.2, 0.001, 0.002, 0.05]),
                   matrix_from_pose([0.1, 0.2, 1.0], ROTATION))
+
+
+def resized(camera, width, height):
+    """Return a camera with the same field of view at another resolution."""
+    K = camera.K.copy()
+    K[0] *= width / camera.width
+    K[1] *= height / camera.height
+    return replace(camera, width=width, height=height, K=K)
 
 
 def a_depth(seed=0):

@@ -40,7 +40,7 @@ def test_a_camera_without_images_is_named(bench, repository, monkeypatch):
     bag = repository / 'bags' / 'demo'
     if not (bag / 'metadata.yaml').is_file():
         pytest.skip('no bundled scene')
-    monkeypatch.setattr(BagScene, 'incomplete', 'there is no depth image of b')
+    monkeypatch.setattr(BagScene, 'warnings', ('there is no depth image of b',))
     node = bench.add(ReplayNode, bag=str(bag))
     assert node.trigger_configure() == SUCCESS
-    assert bench.reasons(node)['bag'] == ('missing_camera', 'there is no depth image of b')
+    assert bench.reasons(node)['bag'] == ('incomplete', 'there is no depth image of b')

@@ -90,10 +90,11 @@ class RawFrames:
             `absurd_extrinsics`, `bad_image`, `size_mismatch`, `wrong_unit` or `no_readings`.
         """
         stated = self._stated()
+        # First: a damaged image says nothing of the size that its calibration must have.
+        depth = _refusing('bad_image', depth_from_message, image, stated.depth_unit)
         camera = self._camera(image, info, transform, bool(stated.rectified))
         if config.table == 'fixed':
             _refuse('absurd_extrinsics', pose_trouble(camera), f'camera {self.name}: ')
-        depth = _refusing('bad_image', depth_from_message, image, stated.depth_unit)
         _refuse('wrong_unit', depth_unit_error(depth, image.encoding, config.max_depth_m))
         _refuse('no_readings', reading_trouble(depth))
         if self.camera is not None and not same_calibration(camera, self.camera):

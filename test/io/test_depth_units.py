@@ -13,9 +13,9 @@ def depth(metres):
 
 @pytest.mark.parametrize('metres, encoding, word', [
     (0.8, '16UC1', None), (3.9, '16UC1', None), (0.06, '32FC1', None),
-    (0.0009, '16UC1', 'metres or centimetres'), (0.04, 'mono16', 'centimetres'),
-    (10.0, '16UC1', 'finer unit'), (65.535, '16UC1', 'saturated'), (900.0, '32FC1', 'millimetres'),
-    (0.0009, '32FC1', 'kilometres'), (np.nan, '32FC1', None)])
+    (0.0009, '16UC1', 'hold metres'), (0.04, 'mono16', 'centimetres'),
+    (10.0, '16UC1', 'tenths of a millimetre'), (65.535, '16UC1', 'saturated'),
+    (900.0, '32FC1', 'millimetres'), (0.0009, '32FC1', 'another unit'), (np.nan, '32FC1', None)])
 def test_units(metres, encoding, word):
     trouble = depth_unit_error(depth(metres), encoding, 4.0)
     assert trouble is None if word is None else word in trouble

@@ -70,6 +70,8 @@ DEPTH = np.random.default_rng(0).uniform(0.5, 2, (HEIGHT, WIDTH)).astype(np.floa
 COLOUR_IMAGE = image(bytes(3 * HEIGHT * WIDTH), 'rgb8', 3 * WIDTH, 'colour')
 MOUNT = (0.1, 0.2, 0.3), (0.0, 0.6, 0.0, 0.8)
 OPTICAL = (0.0, 0.02, 0.0), (0.5, -0.5, 0.5, -0.5)
+# Above a table, looking down on it.
+ABOVE = (0.0, -0.6, 0.7), tuple(Rotation.from_euler('x', -140, degrees=True).as_quat())
 
 
 def test_camera_named_by_its_topic_posed_by_a_tree(tmp_path):
@@ -109,7 +111,7 @@ def test_millimetres_of_any_layout(tmp_path, order, bigendian, padding):
     counts = np.random.default_rng(1).integers(0, 5000, (HEIGHT, WIDTH))
     rows = [row.astype(order + 'u2').tobytes() + b'\xff' * padding for row in counts]
     bag = write(tmp_path / 'b', [
-        tf(transform('table', 'optical', *OPTICAL)), ('/c/depth/camera_info', INFO, info()),
+        tf(transform('table', 'optical', *ABOVE)), ('/c/depth/camera_info', INFO, info()),
         ('/c/depth/image_raw', IMAGE,
          image(b''.join(rows), '16UC1', 2 * WIDTH + padding, 'optical', bigendian))])
     expected = np.where(counts, counts / 1000, np.nan)
@@ -118,7 +120,7 @@ def test_millimetres_of_any_layout(tmp_path, order, bigendian, padding):
 
 def test_the_raw_image_goes_before_the_rectified_one(tmp_path):
     P = np.array([[90.0, 0, 39, 0], [0, 91, 29, 0], [0, 0, 1, 0]])
-    rectified = [tf(transform('table', 'optical', *OPTICAL)),
+    rectified = [tf(transform('table', 'optical', *ABOVE)),
                  ('/c/depth/camera_info', INFO, info(d=[0.1, 0, 0, 0, 0], p=P)),
                  ('/c/depth/image_rect', IMAGE, depth_image(DEPTH + 1))]
     scene = BagScene(write(tmp_path / 'rectified', rectified))
@@ -139,7 +141,7 @@ def test_infrared_is_not_depth(tmp_path):
 
 
 def test_cameras_that_start_apart_meet(tmp_path):
-    messages = [tf(transform('table', 'a', *OPTICAL), transform('table', 'b', *MOUNT))]
+    messages = [tf(transform('table', 'a', *ABOVE), transform('table', 'b', *ABOVE))]
     messages += [(f'/{c}/depth/camera_info', INFO, info(c)) for c in 'ab']
     for i in range(6):
         messages.append(('/a/depth/image_raw', IMAGE, depth_image(DEPTH + i, 'a', i * 100)))
@@ -254,8 +256,9 @@ OBJECT = {'category': 'ball', 'translation': [0, 0, 0.1], 'rotation_xyzw': [0, 0
           'size': [0.1, 0.1, 0.1]}
 
 
-def bag_of(path, told, depths=(1.0,)):
+def bag_of(path, told, depths=(1.0,), *more):
     messages = [] if told is None else [('/hooc/scene_info', STRING, M[STRING](json.dumps(told)))]
+    messages += more
     messages.append(('/c/depth/camera_info', INFO, info()))
     for i, value in enumerate(depths):
         messages.append(('/c/depth/image_raw', IMAGE, depth_image(
@@ -284,8 +287,8 @@ def test_absent_keys_and_null_leave_the_choice_to_the_model(tmp_path):
 
 
 def test_views_of_a_later_frame_set(tmp_path):
-    bag = BagScene(bag_of(tmp_path / 'b', {'world_frame': None}, (1.0, 0.0, 2.0)))
-    bag.table_known = True
+    bag = BagScene(bag_of(tmp_path / 'b', {'world_frame': None}, (1.0, 0.0, 2.0),
+                          tf(transform('table', 'optical', *ABOVE))))
     assert bag.views()[0].depth[0, 0] == 1
     assert bag.views({'c': 0})[0].depth[0, 0] == 1
     # The second holds no reading, so no frame set is made of it.

@@ -176,12 +176,11 @@ class Collector:
 
     def result(self, stamp_ns: int) -> FrameSetResult | None:
         """Return the result of the frame set of a stamp, None while parts are missing."""
-        parts = [self._parts[topic].get(stamp_ns) for topic in (
-            'objects/poses', 'objects/attributes', 'scene/summary', 'objects/unknown',
-            'objects/unknown_attributes')]
-        if any(part is None for part in parts):
+        topics = ('objects/poses', 'objects/attributes', 'scene/summary', 'objects/unknown',
+                  'objects/unknown_attributes')
+        if any(stamp_ns not in self._parts[topic] for topic in topics):
             return None
-        poses, attributes, summary, *unknown = parts
+        poses, attributes, summary, *unknown = (self._parts[topic][stamp_ns] for topic in topics)
         found = candidates_from_messages(poses, attributes)
         rows = cloud_rows(attributes)
         pool = self._pool(stamp_ns)

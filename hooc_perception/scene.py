@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from hooc_perception.core.arrays import Float32Array, Float64Array, Int32Array
-from hooc_perception.core.geometry import matrix_from_pose, posed_vertices
+from hooc_perception.core.geometry import matrix_from_pose, posed_meshes
 from hooc_perception.core.parsing.unexplained import unexplained_points
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera, Energy, GenericModel, Observation, ParsedScene
@@ -119,12 +119,7 @@ class Scene:
 
     def meshes(self) -> list[tuple[Float64Array, Int32Array]]:
         """Return (vertices (V, 3) world, metres; faces (F, 3)) of each object, in place."""
-        objects = self.parsed.objects
-        out = []
-        for k, model in enumerate(objects.shapes(self.models)):
-            out.append((posed_vertices(model, objects.translation[k], objects.rotation_xyzw[k],
-                                       objects.size[k]), model.faces))
-        return out
+        return posed_meshes(self.parsed.objects, self.models)
 
     def depth(self, camera: Camera) -> tuple[Float32Array, Int32Array]:
         """

@@ -2,10 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rigid transforms and pinhole projection. `T_a_b` maps points of frame b into frame a."""
 
+from collections.abc import Sequence
 import zlib
 
-from hooc_perception.core.arrays import AnyArray, Float32Array, Float64Array
-from hooc_perception.core.types import Camera, GenericModel
+from hooc_perception.core.arrays import AnyArray, Float32Array, Float64Array, Int32Array
+from hooc_perception.core.types import Camera, Candidates, GenericModel
 from hooc_perception.errors import HoocError
 import numpy as np
 import numpy.typing as npt
@@ -77,6 +78,18 @@ def posed_vertices(model: GenericModel, translation: npt.ArrayLike,
     """Return (V, 3) world vertices of a GenericModel scaled to `size` and posed."""
     scaled = model.vertices * (np.asarray(size, np.float64) / np.maximum(model.extents, 1e-9))
     return transform(matrix_from_pose(translation, rotation_xyzw), scaled)
+
+
+def posed_meshes(objects: Candidates, models: Sequence[GenericModel]
+                 ) -> list[tuple[Float64Array, Int32Array]]:
+    """
+    Return (vertices (V, 3) world, metres; faces (F, 3)) of each object, in place.
+
+    :param models: class id c is models[c - 1].
+    """
+    return [(posed_vertices(model, objects.translation[k], objects.rotation_xyzw[k],
+                            objects.size[k]), model.faces)
+            for k, model in enumerate(objects.shapes(models))]
 
 
 def stage_rng(seed: int, stage: str, *keys: int) -> np.random.Generator:

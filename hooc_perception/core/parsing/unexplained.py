@@ -5,7 +5,7 @@
 from collections.abc import Sequence
 
 from hooc_perception.core.arrays import Float64Array
-from hooc_perception.core.geometry import back_project, posed_vertices
+from hooc_perception.core.geometry import back_project, posed_meshes
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Candidates, GenericModel, Observation
 import numpy as np
@@ -22,10 +22,7 @@ def unexplained_points(observation: Observation, objects: Candidates,
     :param objects: Candidates.
     :param models: tuple of GenericModel; class id c is models[c - 1].
     """
-    meshes = []
-    for i, model in enumerate(objects.shapes(models)):
-        meshes.append((posed_vertices(model, objects.translation[i], objects.rotation_xyzw[i],
-                                      objects.size[i]), model.faces))
+    meshes = posed_meshes(objects, models)
     left = []
     for view in observation.views:
         composed, _ = render_depth(meshes, view.camera)

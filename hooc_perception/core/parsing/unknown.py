@@ -9,7 +9,7 @@ thing gets an oriented box on the support plane. A heap may be one cluster.
 
 from hooc_perception.core.arrays import BoolArray, Float64Array, Int64Array
 from hooc_perception.core.frame.frame import Frame
-from hooc_perception.core.geometry import matrix_from_pose, posed_vertices, transform
+from hooc_perception.core.geometry import matrix_from_pose, posed_meshes, transform
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Candidates, Observation, UnknownObjects
 import numpy as np
@@ -69,9 +69,7 @@ def find_unknown(frame: Frame, objects: Candidates) -> UnknownObjects:
 def _open(frame: Frame, objects: Candidates) -> BoolArray:
     """Return (n,) bool: the points of the cloud that no object explains."""
     observation: Observation = frame.observation
-    meshes = [(posed_vertices(model, objects.translation[i], objects.rotation_xyzw[i],
-                              objects.size[i]), model.faces)
-              for i, model in enumerate(objects.shapes(frame.models))]
+    meshes = posed_meshes(objects, frame.models)
     n = len(frame.cloud.points)
     total, left = np.zeros(n), np.zeros(n)
     for view, row in zip(observation.views, frame.cloud.row):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from hooc_perception.core.arrays import AnyArray, BoolArray, Float64Array, Int32Array
-from hooc_perception.core.geometry import posed_vertices, stage_rng
+from hooc_perception.core.geometry import posed_meshes, stage_rng
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import (
     Camera,
@@ -65,11 +65,7 @@ def bench_scene(seed: int = 0, n_objects: int = 20) -> BenchScene:
 
 def candidate_meshes(scene: BenchScene) -> list[tuple[Float64Array, Int32Array]]:
     """Return [(vertices world, faces)] of the pool of a BenchScene."""
-    pool, out = scene.pool, []
-    for k, model in enumerate(pool.shapes(scene.models)):
-        out.append((posed_vertices(model, pool.translation[k], pool.rotation_xyzw[k],
-                                   pool.size[k]), model.faces))
-    return out
+    return posed_meshes(scene.pool, scene.models)
 
 
 def _pool(objects: Sequence[PlacedObject], models: Sequence[GenericModel],

@@ -13,17 +13,19 @@ from os import fspath, PathLike
 import time
 from typing import Any, TYPE_CHECKING, TypeVar
 
-from hooc_perception.core.arrays import AnyArray
+from hooc_perception.core.arrays import AnyArray, BoolArray
 from hooc_perception.core.classification.classify import classify, KIND_PAPER
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import inverse, stage_rng
+from hooc_perception.core.incremental.memory import next_step, Past, Step
+from hooc_perception.core.incremental.watch import watch
 from hooc_perception.core.parsing.uncertainty import pose_uncertainty
 from hooc_perception.core.parsing.verifier import Verifier
 from hooc_perception.core.profiles import Profile, with_overrides
 from hooc_perception.core.profiles import profile as profile_of
 from hooc_perception.core.segment.observe import observe, require_table
 from hooc_perception.core.segment.rectify import rectify
-from hooc_perception.core.segment.table import table_pose
+from hooc_perception.core.segment.table import next_table, table_pose
 from hooc_perception.core.symmetry import canonical_objects
 from hooc_perception.core.types import (
     Candidates,
@@ -109,13 +111,64 @@ class Parser:
         """
         lap = _Laps()
         observation = lap('observe', self.observe(views))
-        probabilities = lap('classify', self.classify(observation))
-        frame = self.frame(observation, probabilities)
+        return self._scene(self._whole(observation, lap, seed, change_pool), observation, lap)
+
+    def update(self, views: Sequence[DepthView], previous: Scene | None = None, seed: int = 0,
+               full: bool = False) -> Scene:
+        """
+        Return the objects that one frame set shows, given what was found in the one before.
+
+        While nothing changes, readings are accumulated and the objects stay as they are; what
+        changes is decided anew, the rest is held. Where too much has changed, this is `parse`.
+
+        :param views: one raw depth image per camera.
+        :param previous: what this function returned for the frame set before, in the same
+            target frame; None = this is the first.
+        :param full: decide everything anew on what has been accumulated.
+        :raises HoocError: where the images cannot be used, with the reason.
+        """
+        lap, config = _Laps(), self.profile.observe
+        past = None if previous is None else previous.past
+        rectified = [rectify(view, config) for view in views]
+        table = next_table(None if past is None else past.table, rectified, config)
+        watched = lap('observe', watch(rectified, None if past is None else past.watched, config,
+                                       table.T_target_table))
+        observation = require_table(watched.observation)
+        step = next_step(None if past is None else past.memory, observation,
+                         config.accumulate.full_share, self.method.settle_frames)
+        if past is None or step.full:
+            parsed = self._whole(observation, lap, seed)
+        elif step.region is None and not full:
+            parsed = replace(past.parsed, seconds={})
+        else:
+            parsed = self._revised(observation, past, step, lap, seed, full)
+        return replace(self._scene(parsed, observation, lap),
+                       past=Past(watched, table, step.memory, parsed))
+
+    def _revised(self, observation: Observation, past: Past, step: Step, lap: '_Laps', seed: int,
+                 full: bool) -> ParsedScene:
+        """Return the ParsedScene of an observation that follows others, in the table frame."""
+        frame = self.frame(observation, lap('classify', self.classify(observation)))
+        region, extra = step.region, Candidates.empty()
+        if full:
+            region = tuple(view.foreground for view in observation.views)
+            extra = lap('propose', self.propose(frame, seed))
+        assert region is not None
+        return self.revise(frame, past.parsed, region, seed,
+                           settled=full or step.settled, extra=extra)
+
+    def _whole(self, observation: Observation, lap: '_Laps', seed: int,
+               change_pool: Callable[[Candidates], Candidates] | None = None) -> ParsedScene:
+        """Return the ParsedScene of an observation by itself, in the table frame."""
+        frame = self.frame(observation, lap('classify', self.classify(observation)))
         pool = lap('propose', self.propose(frame, seed))
         if change_pool is not None:
             T = observation.T_target_table
             pool = change_pool(pool.moved(T)).moved(None if T is None else inverse(T))
-        parsed = self.decide(frame, pool, seed)
+        return self.decide(frame, pool, seed)
+
+    def _scene(self, parsed: ParsedScene, observation: Observation, lap: '_Laps') -> Scene:
+        """Return the Scene in the target frame."""
         return scene_of(parsed.moved(observation.T_target_table).timed(**lap.seconds),
                         observation.in_target_frame(), self.models)
 
@@ -145,16 +198,44 @@ class Parser:
 
     def decide(self, frame: Frame, pool: Candidates, seed: int = 0) -> ParsedScene:
         """Stage 4: the subset of candidates that explains the frame, with scores and sigmas."""
-        parsed = self.method.parse(frame, pool, seed, self.max_instances)
+        return self._finished(frame, self.method.parse(frame, pool, seed, self.max_instances),
+                              seed)
+
+    def revise(self, frame: Frame, before: ParsedScene, region: Sequence[BoolArray],
+               seed: int = 0, settled: bool = False,
+               extra: Candidates = Candidates.empty()) -> ParsedScene:
+        """
+        Stages 3 and 4 of a frame set that follows others.
+
+        :param before: the answer to the last one, in the table frame.
+        :param region: per view (H, W) bool, what is decided anew, see `next_step`.
+        :param settled: the region stands still: only what is better by `revise_gain` replaces
+            anything.
+        :param extra: further candidates.
+        """
+        parsed = self.method.revise(frame, before, region, seed, self.max_instances, settled,
+                                    extra)
+        return self._finished(frame, parsed, seed)
+
+    def _finished(self, frame: Frame, parsed: ParsedScene, seed: int) -> ParsedScene:
+        """Return a ParsedScene with the sigmas that it lacks, calibrated scores and the rest."""
         if self.sigmas:
-            start = time.monotonic()
-            sigma_t, sigma_r = pose_uncertainty(frame, parsed, self.method.pixels,
-                                                self.method.objects, stage_rng(seed, 'sigmas'))
-            parsed = replace(parsed, sigma_t=sigma_t, sigma_r=sigma_r).timed(
-                sigmas=time.monotonic() - start)
+            parsed = self._with_sigmas(frame, parsed, seed)
         parsed = replace(parsed, objects=canonical_objects(parsed.objects, self.models))
         return self.method.open_world(frame, self.method.calibrate(frame, parsed),
                                       self._strangers)
+
+    def _with_sigmas(self, frame: Frame, parsed: ParsedScene, seed: int) -> ParsedScene:
+        """Return a ParsedScene with the uncertainty of each pose that has none yet."""
+        start = time.monotonic()
+        n = len(parsed.objects)
+        known = np.zeros(n, bool) if parsed.sigma_t is None else np.isfinite(parsed.sigma_t)
+        new = pose_uncertainty(frame, parsed, self.method.pixels, self.method.objects,
+                               stage_rng(seed, 'sigmas'), np.flatnonzero(~known))
+        old = (parsed.sigma_t, parsed.sigma_r) if known.any() else new
+        sigma_t, sigma_r = (np.where(known, a, b) for a, b in zip(old, new))
+        return replace(parsed, sigma_t=sigma_t, sigma_r=sigma_r).timed(
+            sigmas=time.monotonic() - start)
 
 
 class _Laps:

@@ -7,6 +7,7 @@ from typing import Any
 
 from hooc_perception.core.arrays import Float32Array, Float64Array, Int32Array
 from hooc_perception.core.geometry import matrix_from_pose, posed_meshes
+from hooc_perception.core.incremental.memory import Past
 from hooc_perception.core.parsing.unexplained import unexplained_points
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera, Energy, GenericModel, Observation, ParsedScene
@@ -83,6 +84,7 @@ class Scene:
     :ivar parsed: the same as arrays, with all candidates that were considered.
     :ivar observation: the rectified views that were parsed, with foreground and background.
     :ivar models: generic models of all categories.
+    :ivar past: what `Parser.update` remembers for the next frame set; None = it was `parse`.
     """
 
     objects: tuple[SceneObject, ...]
@@ -90,6 +92,7 @@ class Scene:
     parsed: ParsedScene = field(repr=False)
     observation: Observation = field(repr=False)
     models: tuple[GenericModel, ...] = field(repr=False)
+    past: Past | None = field(default=None, repr=False)
 
     @property
     def energy(self) -> Energy:

@@ -323,6 +323,7 @@ class ParsedScene:
     :ivar sigma_t, sigma_r: (n,) float32, metres and radians within which 68 % of the errors lie,
         see core.parsing.uncertainty; NaN where that is not known, None where nobody asked.
     :ivar unknown: things of no category, see core.parsing.unknown.
+    :ivar runners_up: the candidates that were in the running at last and were not chosen.
     :ivar converged: False where a deadline ended the search.
     :ivar seconds: wall time of each stage.
     :ivar hidden_s: (n,) float32, seconds since an object that the robot hides was last seen; 0 for
@@ -342,6 +343,7 @@ class ParsedScene:
     sigma_r: Float32Array | None = None
     unknown: UnknownObjects = field(default_factory=UnknownObjects.empty)
     hidden_s: Float32Array | None = None
+    runners_up: Candidates = field(default_factory=Candidates.empty)
 
     def take(self, index: 'AnyArray') -> 'ParsedScene':
         """Return the scene with those objects that a bool mask names; its energy stays."""
@@ -355,7 +357,8 @@ class ParsedScene:
     def moved(self, T_to_from: Float64Array | None) -> 'ParsedScene':
         """Return the same in another frame, by a rigid (4, 4); None = the same frame."""
         return replace(self, objects=self.objects.moved(T_to_from),
-                       pool=self.pool.moved(T_to_from), unknown=self.unknown.moved(T_to_from))
+                       pool=self.pool.moved(T_to_from), unknown=self.unknown.moved(T_to_from),
+                       runners_up=self.runners_up.moved(T_to_from))
 
     def timed(self, **seconds: float) -> 'ParsedScene':
         """Return a copy whose `seconds` also hold the given stages."""

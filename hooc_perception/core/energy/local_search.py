@@ -73,6 +73,35 @@ class SearchResult:
     kicks: int
 
 
+class HeldEnergy:
+    """
+    An energy some of whose candidates stay as they are: in the subset, or out of it.
+
+    :param held: (n,) bool.
+    """
+
+    def __init__(self, energy: SearchableEnergy, held: BoolArray) -> None:
+        self.n, self._energy, self._held = energy.n, energy, held
+
+    @property
+    def mask(self) -> BoolArray:
+        """Return a copy of the current subset, (n,) bool."""
+        return self._energy.mask
+
+    @property
+    def value(self) -> float:
+        """Return the energy of the current subset."""
+        return self._energy.value
+
+    def deltas(self) -> Float64Array:
+        """Return (n,) float64: the change by each flip, inf where it is held."""
+        return np.where(self._held, np.inf, self._energy.deltas())
+
+    def flip(self, k: int) -> None:
+        """Add candidate k to the subset, or remove it."""
+        self._energy.flip(k)
+
+
 class OutOfTimeError(Exception):
     """Raised and caught in here when `stop` says that time is up."""
 
@@ -106,6 +135,8 @@ def best_swap(energy: SearchableEnergy, stop: Stop | None = None) -> bool:
     best, pair = -TINY, None
     for a in np.flatnonzero(energy.mask).tolist():
         leaves = energy.deltas()[a]
+        if not np.isfinite(leaves):
+            continue
         energy.flip(a)
         deltas = energy.deltas()
         deltas[a] = np.inf
@@ -179,9 +210,8 @@ def _kick(energy: SearchableEnergy, rng: np.random.Generator, most: int) -> None
     """
     held = np.zeros(energy.n, bool)
     for _ in range(rng.integers(1, most + 1)):
-        mask = energy.mask
-        choice = np.flatnonzero(~held & (mask if rng.random() < .5 else
-                                         ~mask & np.isfinite(energy.deltas())))
+        mask, free = energy.mask, ~held & np.isfinite(energy.deltas())
+        choice = np.flatnonzero(free & (mask if rng.random() < .5 else ~mask))
         if len(choice):
             k = int(rng.choice(choice))
             held[k] = True

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from hooc_perception.core.arrays import (
     AnyArray,
+    BoolArray,
     Float32Array,
     Float64Array,
     Int32Array,
@@ -63,7 +64,7 @@ class Evidence:
         :param cloud: Cloud of the observation; `patch` (n,) labels of its points.
         :param unknown_weight: PixelCosts.unknown_weight.
         """
-        self.scale = 1.0 / (stride * stride)
+        self.stride, self.scale = stride, 1.0 / (stride * stride)
         self.row = _stacked(cloud.row, stride)
         self.n_points = len(patch)
         self.views = _views_of(observation, probabilities, cloud, _labels(patch, self.row), stride)
@@ -126,6 +127,23 @@ class Evidence:
         total = np.bincount(self.row[seen], minlength=self.n_points)
         left = np.bincount(self.row[seen], weights=cost > UNEXPLAINED, minlength=self.n_points)
         return left / np.maximum(total, 1)
+
+    def share_of_points(self, region: Sequence[BoolArray]) -> Float64Array:
+        """
+        Return (n,) float64, the share of each cloud point's pixels that lie in a region.
+
+        :param region: per view (H, W) bool.
+        """
+        seen = self.row >= 0
+        inside = _stacked(region, self.stride)[seen]
+        total = np.bincount(self.row[seen], minlength=self.n_points)
+        return np.bincount(self.row[seen], weights=inside,
+                           minlength=self.n_points) / np.maximum(total, 1)
+
+    def share_of_lists(self, lists: PixelLists, region: Sequence[BoolArray]) -> Float64Array:
+        """Return (m,) float64, the share of each list's pixels in a region, see above."""
+        inside = np.concatenate([[0], np.cumsum(_stacked(region, self.stride)[lists.pixel])])
+        return np.diff(inside[lists.offsets]) / np.maximum(np.diff(lists.offsets), 1)
 
     def refine(self, hypotheses: Float64Array, shape: AnyArray, weights: PixelWeights,
                settings: RefineSettings, rng: np.random.Generator,

@@ -7,11 +7,11 @@ Hypotheses are sampled and refined in the voxel field (sampling.py), then ranked
 ranked again in the images.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
-from hooc_perception.core.arrays import AnyArray, Float64Array, Int64Array
+from hooc_perception.core.arrays import AnyArray, BoolArray, Float64Array, Int64Array
 from hooc_perception.core.frame.costs import PixelCosts
 from hooc_perception.core.frame.evidence import Evidence, hypotheses_of
 from hooc_perception.core.frame.frame import Frame
@@ -32,6 +32,8 @@ from scipy.spatial.transform import Rotation
 
 # Pixels in half resolution that are enough to refine a hypothesis.
 MANY = 120
+# Weight of points that are explained, where the unexplained ones are drawn with 1.
+ELSEWHERE = 0.02
 # Refinement in the images: cost of the squared log scale per covered pixel, and initial random
 # steps (metres, radians, log scale).
 SIZE_PRIOR, STEP_SIZES = 0.1, (0.006, 0.08, 0.05)
@@ -64,8 +66,13 @@ def propose(frame: Frame, config: ProposeConfig, costs: PixelCosts,
 
 
 def propose_more(frame: Frame, objects: Candidates, config: ProposeConfig, costs: PixelCosts,
-                 rng: np.random.Generator) -> Candidates:
-    """Return further Candidates for what `objects` leave unexplained."""
+                 rng: np.random.Generator, region: Sequence[BoolArray] | None = None,
+                 ) -> Candidates:
+    """
+    Return further Candidates for what `objects` leave unexplained.
+
+    :param region: per view (H, W) bool, where they are looked for; None = everywhere.
+    """
     if frame.field is None:
         return Candidates.empty()
 
@@ -76,11 +83,15 @@ def propose_more(frame: Frame, objects: Candidates, config: ProposeConfig, costs
         return evidence.compose(np.arange(len(objects)), lists)
 
     left = frame.coarse.unexplained(shown(frame.coarse))
+    weight = left + ELSEWHERE
+    if region is not None:
+        left = left * (frame.evidence.share_of_points(region) > 0)
+        weight = left
     if not left.any():
         return Candidates.empty()
     H, shape = sample(
         frame.cloud, frame.field, frame.shapes, config, rng,
-        SampleCounts(config.round_samples, config.round_pool, config.refine_steps), left + 0.02)
+        SampleCounts(config.round_samples, config.round_pool, config.refine_steps), weight)
     few = config.round_per_category
     return _ranked(frame, _Ranking(config, costs, few, few), rng, H, shape, shown)
 

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The joint method: model-driven candidates, one energy for categories, poses and sizes."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from hooc_perception.core.arrays import BoolArray
 from hooc_perception.core.energy.eq1 import energy_of
 from hooc_perception.core.energy.local_search import SearchResult
 from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
@@ -14,7 +16,15 @@ from hooc_perception.core.methods.protocol import Deadline
 from hooc_perception.core.parsing.answer import Choice, parsed_scene
 from hooc_perception.core.parsing.calibration import calibrated_scores
 from hooc_perception.core.parsing.config import ParseConfig
-from hooc_perception.core.parsing.search import Search, search_scene
+from hooc_perception.core.parsing.revise import (
+    around,
+    at_effort,
+    drawn_at_effort,
+    effort_of,
+    search_with,
+    with_held,
+)
+from hooc_perception.core.parsing.search import improved, Search, search_scene
 from hooc_perception.core.parsing.unknown import find_unknown
 from hooc_perception.core.parsing.verifier import features, Verifier
 from hooc_perception.core.types import Candidates, ParsedScene
@@ -44,6 +54,11 @@ class JointMethod:
         """Return the object costs of the joint energy."""
         return self._parse.objects
 
+    @property
+    def settle_frames(self) -> int:
+        """Return after how many frame sets without change a change is looked at again."""
+        return self._parse.revise.settle_frames
+
     def propose(self, frame: Frame, seed: int) -> Candidates:
         """Return candidates of every category, the best of each first."""
         return propose(frame, self._propose, self.pixels, stage_rng(seed, 'propose'))
@@ -62,15 +77,54 @@ class JointMethod:
               ) -> ParsedScene:
         """Search the scene, let the verifier judge the candidates, and decide."""
         deadline, rng = Deadline(self._parse.deadline_s), stage_rng(seed, 'parse')
-        search, found, considered = self._search(frame, pool, seed, max_instances, deadline, rng)
+        found = self._search(frame, pool, seed, max_instances, deadline, rng)
+        return self._decided(frame, *found, deadline, rng)[0]
+
+    def revise(self, frame: Frame, before: ParsedScene, region: Sequence[BoolArray], seed: int,
+               max_instances: int = 0, settled: bool = False,
+               extra: Candidates = Candidates.empty()) -> ParsedScene:
+        """
+        Return the objects of a frame set that follows one whose answer is known.
+
+        Objects that the region does not touch stay as they are, with their score.
+
+        :param before: the answer, in the table frame.
+        :param region: per view (H, W) bool, what is decided anew.
+        :param settled: the region stands still: an object of `before` is replaced only by one
+            that is better by a margin.
+        :param extra: further candidates.
+        """
+        deadline, rng = Deadline(self._parse.deadline_s), stage_rng(seed, 'parse')
+        effort = effort_of(frame, region, self._parse.revise.least_effort)
+        config, drawn = at_effort(self._parse, effort), drawn_at_effort(self._propose, effort)
+        start = search_with(frame, before, region, config, max_instances)
+        wide, held_before = around(region), start.held[:len(before.objects)]
+
+        def more(objects: Candidates, turn: int) -> Candidates:
+            return propose_more(frame, objects, drawn, self.pixels,
+                                stage_rng(seed, 'propose', turn), wide)
+
+        start.add(more(start.chosen.take(start.held[start.mask]), 0).extended(extra))
+        found = improved(frame, start, config.revise.revise_rounds, rng, more, deadline.passed)
+        parsed, search = self._decided(frame, *found, deadline, rng,
+                                       self._parse.revise.revise_gain if settled else 0.0)
+        return with_held(parsed, before, search.held[search.mask], held_before)
+
+    def _decided(self, frame: Frame, search: Search, found: SearchResult, considered: Candidates,
+                 deadline: Deadline, rng: np.random.Generator, gain: float = 0.0,
+                 ) -> tuple[ParsedScene, Search]:
+        """Return the ParsedScene after the verifier's judgement, and the Search."""
         probability = None
         if self._verifies and self._verifier is not None and len(search.pool):
             probability = self._verifier.probability(features(search))
             search.weigh_verdict(probability)
+        if gain:
+            search.favour_kept(gain)
+        if probability is not None or gain:
             found = search.run(rng, deadline.passed)
         choice = Choice(search.pool, search.mask, search.marginal_energies(),
                         found.converged and not deadline.passed(), considered, probability)
-        return parsed_scene(frame, choice, self.pixels).timed(parse=deadline.elapsed)
+        return parsed_scene(frame, choice, self.pixels).timed(parse=deadline.elapsed), search
 
     def calibrate(self, frame: Frame, parsed: ParsedScene) -> ParsedScene:
         """Return the scene with scores from marginal energies, unless the verifier gave them."""

@@ -2,8 +2,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """The method of Basevi & Leonardis (2016), step by step: section 4 of the paper."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+from hooc_perception.core.arrays import BoolArray
 from hooc_perception.core.config import Config, group, param
 from hooc_perception.core.energy.eq1 import Eq1
 from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
@@ -39,6 +41,8 @@ class PaperMethod:
 
     # The paper has no such costs: these only describe the result, in the units of the others.
     pixels, objects = PixelCosts(unknown_weight=0.0), ObjectCosts()
+    # It looks at frame sets one by one.
+    settle_frames = 0
 
     def __init__(self, propose: FragmentConfig = FragmentConfig(),
                  parse: PaperParseConfig = PaperParseConfig()) -> None:
@@ -60,6 +64,12 @@ class PaperMethod:
         energy.reset(mask)
         choice = Choice(pool, mask, energy.deltas()[mask], converged, energy=energy.energy(mask))
         return parsed_scene(frame, choice, self.pixels).timed(parse=deadline.elapsed)
+
+    def revise(self, frame: Frame, before: ParsedScene, region: Sequence[BoolArray], seed: int,
+               max_instances: int = 0, settled: bool = False,
+               extra: Candidates = Candidates.empty()) -> ParsedScene:
+        """Return what the frame set shows by itself: the paper knows single frame sets only."""
+        return self.parse(frame, self.propose(frame, seed), seed, max_instances)
 
     def calibrate(self, frame: Frame, parsed: ParsedScene) -> ParsedScene:
         """Return the scene as it is: Eq. 1 is a mean over pixels and tells no probability."""

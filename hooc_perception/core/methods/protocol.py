@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a method has to offer: candidates of a frame, and the objects among them."""
 
+from collections.abc import Sequence
 import time
 from typing import Protocol
 
+from hooc_perception.core.arrays import BoolArray
 from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.types import Candidates, ParsedScene
@@ -28,6 +30,11 @@ class Method(Protocol):
         """Return the object costs by which uncertainty is measured."""
         ...
 
+    @property
+    def settle_frames(self) -> int:
+        """Return after how many frame sets without change a change is looked at again."""
+        ...
+
     def propose(self, frame: Frame, seed: int) -> Candidates:
         """Return candidates of every category, the best of each first."""
         ...
@@ -38,6 +45,20 @@ class Method(Protocol):
         Return the objects that together explain the frame best.
 
         :param max_instances: most objects per category, 0 = no limit.
+        """
+        ...
+
+    def revise(self, frame: Frame, before: ParsedScene, region: Sequence[BoolArray], seed: int,
+               max_instances: int = 0, settled: bool = False,
+               extra: Candidates = Candidates.empty()) -> ParsedScene:
+        """
+        Return the objects of a frame set that follows one whose answer is known.
+
+        :param before: the answer, in the table frame.
+        :param region: per view (H, W) bool, what is decided anew.
+        :param settled: the region stands still: an object of `before` is replaced only by one
+            that is better by a margin.
+        :param extra: further candidates.
         """
         ...
 

@@ -52,7 +52,7 @@ def parsed_scene(frame: Frame, choice: Choice, costs: PixelCosts) -> ParsedScene
     if not n:
         none = np.zeros(0, np.float32)
         return ParsedScene(objects, energy, none, none, none, np.zeros(0, np.uint8), considered,
-                           choice.converged)
+                           choice.converged, runners_up=choice.pool)
     evidence, weights = frame.evidence, costs.weights()
     H, shape = hypotheses_of(objects, frame.shapes), frame.shapes.of(objects)
     _, lists = evidence.compare_pixels(H, shape, weights)
@@ -69,4 +69,4 @@ def parsed_scene(frame: Frame, choice: Choice, costs: PixelCosts) -> ParsedScene
         objects, energy, (seen / alone).astype(np.float32),
         (stats[:, stat.RESIDUAL] / np.maximum(agree, 1)).astype(np.float32),
         np.asarray(choice.marginal_energy, np.float32), stats[:, stat.VIEWS].astype(np.uint8),
-        considered, choice.converged)
+        considered, choice.converged, runners_up=choice.pool.take(~choice.mask))

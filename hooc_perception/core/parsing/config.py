@@ -33,12 +33,30 @@ class OpenWorldConfig(Config):
 
 
 @dataclass(frozen=True)
+class ReviseConfig(Config):
+    """How the previous answer is revised; only `update` does so."""
+
+    revise_rounds: int = param(1, 'Rounds of refinement and re-proposal where something has '
+                               'changed.', low=0)
+    least_effort: float = param(
+        0.3, 'Where little has changed, this share of the candidates of a round of re-proposal is '
+        'enough; where a third of the foreground has changed, all are drawn.', '', 0.01, 1.0)
+    settle_frames: int = param(
+        4, 'What has changed is looked at again, with the readings of all frame sets since, when '
+        'so many frame sets in a row have shown no further change; 0 = never.', '', 0, 1000,
+        runtime=True)
+    revise_gain: float = param(
+        40.0, 'Where nothing has changed, another object must be better by this to replace '
+        'that of the previous answer.', 'px', 0.0, 1e5, runtime=True)
+
+
+@dataclass(frozen=True)
 class ParseConfig(Config):
     """
     Parameters of stage 4 of the joint method.
 
     :ivar search: of the discrete search; `pixels` and `objects` of the joint energy, `verdict`
-        of the verifier, `open_world` of things of no category.
+        of the verifier, `open_world` of things of no category, `revise` of later frame sets.
     """
 
     rounds: int = param(3, 'Rounds of refinement and re-proposal.', low=0)
@@ -58,3 +76,4 @@ class ParseConfig(Config):
     objects: ObjectCosts = group(ObjectCosts())
     verdict: VerdictConfig = group(VerdictConfig())
     open_world: OpenWorldConfig = group(OpenWorldConfig())
+    revise: ReviseConfig = group(ReviseConfig())

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.energy.joint import JointEnergy
-from hooc_perception.core.energy.local_search import local_search, SearchResult
+from hooc_perception.core.energy.local_search import HeldEnergy, local_search, SearchResult
 from hooc_perception.core.frame.evidence import Evidence, hypotheses_of
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.frame.kernels.records import Context, RefineSettings
@@ -42,13 +42,24 @@ def search_scene(frame: Frame, pool: Candidates, config: ParseConfig, rng: np.ra
     """
     search = Search(frame.coarse, frame.models, config, max_instances)
     search.add(pool)
-    considered = pool
-    for turn in range(config.rounds + 1):
+    return improved(frame, search, config.rounds, rng, more, late)
+
+
+def improved(frame: Frame, search: 'Search', rounds: int, rng: np.random.Generator,
+             more: Proposer | None = None, late: Callable[[], bool] = lambda: False,
+             ) -> tuple['Search', SearchResult, Candidates]:
+    """
+    Return what `search_scene` returns, from a Search on coarse pixels and its current subset.
+
+    :param rounds: of refinement and re-proposal.
+    """
+    config, considered = search.config, search.pool
+    for turn in range(rounds + 1):
         found = search.run(rng, late)
         if not found.converged or late():
             break
         search.merge_pairs(rng)
-        last = turn == config.rounds
+        last = turn == rounds
         new = search.refined_copies(config.turn_steps if last else config.polish_steps, rng, last)
         new = new.extended(search.exchanged_members(config.member_steps, rng))
         if more is not None and not last and not late():
@@ -70,6 +81,8 @@ class Search:
     A pool with its pixel lists at one resolution, and the subset chosen so far.
 
     :ivar pool: Candidates; `mask` (n,) bool, which of them are chosen.
+    :ivar held: (n,) bool, chosen candidates that stay as they are; `kept` (n,) bool, candidates
+        that stay in the pool.
     :ivar stats: (n, STATS) of the pool, each candidate alone in the images; `lists` its pixels.
     """
 
@@ -78,6 +91,7 @@ class Search:
         self.evidence, self.models, self.config = evidence, models, config
         self.max_instances = max_instances
         self.pool, self.mask = Candidates.empty(), np.zeros(0, bool)
+        self.held, self.kept = np.zeros(0, bool), np.zeros(0, bool)
         self.stats, self.lists = evidence.compare_pixels(
             hypotheses_of(self.pool, evidence.shapes), evidence.shapes.of(self.pool),
             config.pixels.weights())
@@ -108,12 +122,26 @@ class Search:
         self.stats = stats if first else np.concatenate([self.stats, stats])
         self.lists = lists if first else self.lists.extended(lists)
         self.pool = self.pool.extended(new)
-        self.mask = np.concatenate([self.mask, np.zeros(len(new), bool)])
+        none = np.zeros(len(new), bool)
+        self.mask, self.held, self.kept = (np.concatenate([rows, none]) for rows in (
+            self.mask, self.held, self.kept))
+
+    def start(self, objects: Candidates, held: BoolArray) -> None:
+        """
+        Add the objects of an earlier answer to the pool, where they stay.
+
+        :param held: (n,) bool, those that are chosen and stay as they are.
+        """
+        first = len(self.pool)
+        self.add(objects)
+        self.kept[first:] = True
+        self.mask[first:] = self.held[first:] = held
 
     def run(self, rng: np.random.Generator, late: Callable[[], bool]) -> SearchResult:
         """Search from the current subset, which becomes the best that was found."""
         self._energy = self._build_energy()
-        found = local_search(self._energy, rng, self.config.search, late)
+        energy = HeldEnergy(self._energy, self.held) if self.held.any() else self._energy
+        found = local_search(energy, rng, self.config.search, late)
         self.mask = found.mask
         return found
 
@@ -125,8 +153,8 @@ class Search:
         :param turned: start them half a turn away, about each axis where that is visible: no
             refinement takes such a long step.
         """
-        chosen = np.flatnonzero(self.mask)
-        start, context = self.pool.take(chosen), self.evidence.compose(chosen, self.lists)
+        chosen = np.flatnonzero(self.mask & ~self.held)
+        start, context = self.pool.take(chosen), self._shown()
         if turned:
             start, row = half_turns(start, self.models)
             chosen = chosen[row]
@@ -136,7 +164,7 @@ class Search:
 
     def exchanged_members(self, steps: int, rng: np.random.Generator) -> Candidates:
         """Return refined copies of the chosen candidates with each other mesh of their family."""
-        chosen = np.flatnonzero(self.mask)
+        chosen = np.flatnonzero(self.mask & ~self.held)
         objects, shapes = self.pool.take(chosen), self.evidence.shapes
         family = shapes.family[shapes.of(objects)]
         rows = np.repeat(np.arange(len(chosen)), family - 1)
@@ -145,19 +173,18 @@ class Search:
         member = np.concatenate([np.setdiff1d(np.arange(n), [own])
                                  for n, own in zip(family, objects.member)])
         start = replace(objects.take(rows), member=member.astype(np.uint16))
-        context = self.evidence.compose(chosen, self.lists)
-        return self._refined(start, chosen[rows], context, steps, rng)
+        return self._refined(start, chosen[rows], self._shown(), steps, rng)
 
     def merge_pairs(self, rng: np.random.Generator) -> None:
         """Replace two chosen objects of one category by one where that costs less."""
-        steps = self.config.polish_steps
-        chosen = np.flatnonzero(self.mask)
+        steps, members = self.config.polish_steps, np.flatnonzero(self.mask)
+        chosen = np.flatnonzero(self.mask & ~self.held)
         start, pairs = merged_pairs(self.pool.take(chosen), self.models)
         if not len(start) or not steps:
             return
         merged = Candidates.empty()
         for k, pair in enumerate(chosen[pairs]):
-            others = self.evidence.compose(np.setdiff1d(chosen, pair), self.lists)
+            others = self.evidence.compose(np.setdiff1d(members, pair), self.lists)
             merged = merged.extended(self._refined(start.take([k]), [-1], others, steps, rng))
         first = len(self.pool)
         self.add(merged)
@@ -169,19 +196,19 @@ class Search:
                 self.energy.reset(mask)
 
     def shortlist(self, most: int) -> BoolArray:
-        """Return (n,) bool: the chosen and, per category, the `most` cheapest to add."""
-        keep = self.mask.copy()
+        """Return (n,) bool: chosen and kept ones and, per category, the `most` cheapest to add."""
+        keep = self.mask | self.kept
         costs = self.energy.joining_costs()
         for c in np.unique(self.pool.category):
-            mine = np.flatnonzero((self.pool.category == c) & ~self.mask)
+            mine = np.flatnonzero((self.pool.category == c) & ~keep)
             keep[mine[np.argsort(costs[mine], kind='stable')[:most]]] = True
         return keep
 
     def subset(self, rows: BoolArray) -> 'Search':
         """Return a new search with only some rows (n,) bool of the pool."""
         other = Search(self.evidence, self.models, self.config, self.max_instances)
-        other.pool, other.mask, other.stats = (
-            self.pool.take(rows), self.mask[rows], self.stats[rows])
+        other.pool, other.stats = self.pool.take(rows), self.stats[rows]
+        other.mask, other.held, other.kept = self.mask[rows], self.held[rows], self.kept[rows]
         other.lists = self.lists.take(np.flatnonzero(rows))
         return other
 
@@ -189,7 +216,7 @@ class Search:
         """Return a new search on other pixels, with only some rows (n,) bool of the pool."""
         other = Search(evidence, self.models, self.config, self.max_instances)
         other.add(self.pool.take(rows))
-        other.mask = self.mask[rows]
+        other.mask, other.held, other.kept = self.mask[rows], self.held[rows], self.kept[rows]
         return other
 
     def weigh_verdict(self, probability: Float64Array) -> None:
@@ -203,9 +230,19 @@ class Search:
             penalty = np.maximum(penalty, verdict.least_cost)
         self._penalty = penalty
 
+    def favour_kept(self, pixels: float) -> None:
+        """Let each candidate that stays in the pool cost so much less, in pixels."""
+        penalty = np.full(len(self.pool), self.config.objects.base_cost) \
+            if self._penalty is None else self._penalty
+        self._penalty = penalty - pixels * self.kept
+
     def marginal_energies(self) -> Float64Array:
         """Return (chosen,) how much the energy rises if an object is removed, in pixels."""
         return self.energy.deltas()[self.mask]
+
+    def _shown(self) -> Context:
+        """Return the Context of the chosen candidates."""
+        return self.evidence.compose(np.flatnonzero(self.mask), self.lists)
 
     def _refined(self, start: Candidates, own: Sequence[int] | np.ndarray, context: Context,
                  steps: int, rng: np.random.Generator) -> Candidates:

@@ -16,6 +16,9 @@ from scipy.spatial.transform import Rotation
 # A rotation by a radian counts as much as a translation by this share of the longest side: it
 # tells two neighbours of one category apart, but a wrong orientation alone makes no new object.
 TURN_WEIGHT = 0.1
+# Of an object that was carried away and put down, the sides differ by no more than this, in
+# natural logarithms: it is seen from other sides.
+SAME_SIZE = 0.25
 
 
 @dataclass(frozen=True)
@@ -25,8 +28,10 @@ class TrackConfig(Config):
     track_ttl_s: float = param(30.0, 'An object that is not found for longer than this is '
                                'forgotten and gets a new id if it returns; 0: every result has '
                                'new ids.', 's', 0.0, 3600.0, runtime=True)
-    track_reach_m: float = param(0.15, 'An object that moved farther than this gets a new id.',
-                                 'm', 0.001, 10.0, runtime=True)
+    track_reach_m: float = param(
+        0.15, 'An object within this distance of where one of its category was is the same. '
+        'Farther away it is the same only if it is as large and the other one has vanished.', 'm',
+        0.001, 10.0, runtime=True)
     keep_hidden_s: float = param(
         300.0, 'An object that the robot hides stays in the results with flag 8, as it was last '
         'seen, for at most this time; 0: it is missing.', 's', 0.0, 86400.0, runtime=True)
@@ -39,6 +44,8 @@ class _Track:
     category: int
     translation: Float64Array
     R: Float64Array
+    size: Float64Array
+    member: int
     stamp_ns: int
 
 
@@ -47,8 +54,9 @@ class Tracker:
     Give the objects of successive results lasting ids and steady orientations.
 
     Objects of one category are matched so that the sum of their motions is least; rotations that
-    leave a symmetric model as it is count nothing. An object whose category changes gets a new id;
-    one that is found with another mesh of its family keeps it.
+    leave a symmetric model as it is count nothing. What is left over was carried: an object has
+    the id of one of its category, mesh and size that has vanished. An object whose category
+    changes gets a new id; one that is found in its place with another mesh of its family keeps it.
 
     :param models: tuple of GenericModel; class id c is models[c - 1].
     """
@@ -91,6 +99,8 @@ class Tracker:
         if self.config.track_ttl_s > 0:
             for row, number in self._matches(objects):
                 ids[row], references[row] = number, self._tracks[number].R
+            for row, number in self._carried(objects, ids):
+                ids[row] = number
             objects = canonical_objects(objects, self.models, references)
         for row in np.flatnonzero(ids == 0):
             ids[row] = self._next_id
@@ -98,7 +108,8 @@ class Tracker:
         for row, number in enumerate(ids):
             self._tracks[int(number)] = _Track(
                 int(objects.category[row]), objects.translation[row],
-                Rotation.from_quat(objects.rotation_xyzw[row]).as_matrix(), stamp_ns)
+                Rotation.from_quat(objects.rotation_xyzw[row]).as_matrix(),
+                objects.size[row].astype(float), int(objects.member[row]), stamp_ns)
         return ids, objects
 
     def update_unknown(self, stamp_ns: int, unknown: UnknownObjects) -> UInt32Array:
@@ -123,6 +134,25 @@ class Tracker:
         for number, translation in zip(ids.tolist(), unknown.translation):
             self._things[number] = translation, stamp_ns
         return ids
+
+    def _carried(self, objects: Candidates, ids: UInt32Array) -> list[tuple[int, int]]:
+        """Return (row, id) of new objects that have vanished elsewhere, the likest first."""
+        gone = {n: track for n, track in self._tracks.items() if n not in ids}
+        pairs = []
+        for row in np.flatnonzero(ids == 0):
+            for number, track in gone.items():
+                if (track.category, track.member) != (objects.category[row], objects.member[row]):
+                    continue
+                ratio = np.sort(objects.size[row].astype(float)) / np.sort(track.size)
+                apart = float(np.abs(np.log(np.maximum(ratio, 1e-9))).max())
+                if apart <= SAME_SIZE:
+                    # The one that vanished last, then the likest.
+                    pairs.append((-track.stamp_ns, apart, int(row), number))
+        matched: list[tuple[int, int]] = []
+        for _, _, row, number in sorted(pairs):
+            if all(row != r and number != n for r, n in matched):
+                matched.append((row, number))
+        return matched
 
     def _matches(self, objects: Candidates) -> Iterator[tuple[int, int]]:
         """Yield (row, id) of the objects that are known already."""

@@ -44,7 +44,8 @@ WITHIN = 0.68
 
 
 def pose_uncertainty(frame: Frame, parsed: ParsedScene, pixels: PixelCosts,
-                     costs: ObjectCosts, rng: np.random.Generator) -> Float32Array:
+                     costs: ObjectCosts, rng: np.random.Generator,
+                     rows: Int64Array | None = None) -> Float32Array:
     """
     Return (sigma_t (n,), sigma_r (n,)) float32 of the objects of a ParsedScene.
 
@@ -53,23 +54,25 @@ def pose_uncertainty(frame: Frame, parsed: ParsedScene, pixels: PixelCosts,
     would not do; NaN for a ball. Both assume that the category is right.
 
     :param pixels: of the energy, like `costs`.
+    :param rows: of the objects that it is asked for, NaN for the others; None = all.
     """
     objects = parsed.objects
     n = len(objects)
-    if not n:
-        return np.zeros((2, 0), np.float32)
+    rows = np.arange(n) if rows is None else rows
+    if not len(rows):
+        return np.full((2, n), np.nan, np.float32)
     models = frame.models
     cost = _Cost(frame.coarse, objects, models, pixels, costs)
     shapes = objects.shapes(models)
     longest = np.array([shape.longest_side for shape in shapes])
-    information = _information(cost, longest)
-    flipped = _flip_probabilities(cost, objects, models, rng)
+    information = _information(cost, longest, rows)
+    flipped = _flip_probabilities(cost, objects, models, rng, rows)
     out = np.full((2, n), np.nan, np.float32)
-    for k in range(n):
-        half = longest[k] / 2
+    for i, k in enumerate(rows.tolist()):
+        half = float(longest[k]) / 2
         units = np.repeat([1.0, half, half], 3)     # metres at the surface
         heat = HEAT * (max(float(parsed.residual_m[k]), LEAST_M) / TYPICAL_M) ** 2
-        covariance = np.linalg.inv(information[k] / heat + np.diag(
+        covariance = np.linalg.inv(information[i] / heat + np.diag(
             (np.repeat(PRIOR, 3) * units) ** -2.0))
         # Errors spread wider than least squares think: sigma goes with the variance.
         variance = np.trace(covariance[:3, :3]) + (SHAPE * longest[k]) ** 2
@@ -82,11 +85,11 @@ def pose_uncertainty(frame: Frame, parsed: ParsedScene, pixels: PixelCosts,
             along = Rotation.from_quat(objects.rotation_xyzw[k]).as_matrix()[:, axis]
             across = np.eye(3) - np.outer(along, along)
             turning = across @ turning @ across
-        if 1 - flipped[k] <= WITHIN:
+        if 1 - flipped[i] <= WITHIN:
             out[1, k] = np.pi
         else:
             local = SCALE_R * np.sqrt(np.trace(turning)) / half
-            out[1, k] = min(np.pi, local * _wider(flipped[k]))
+            out[1, k] = min(np.pi, local * _wider(flipped[i]))
     return out
 
 
@@ -124,17 +127,17 @@ def _wider(p_flip: float) -> float:
     return float(np.sqrt(chi2.ppf(WITHIN / (1 - p_flip), 3) / chi2.ppf(WITHIN, 3)))
 
 
-def _information(cost: _Cost, longest: Float64Array) -> Float64Array:
+def _information(cost: _Cost, longest: Float64Array, rows: Int64Array) -> Float64Array:
     """
-    Return (n, 9, 9), what the pixels say of pose and size: the sum of J J', in 1 / square metres.
+    Return (rows, 9, 9), what the pixels say of pose and size: the sum of J J', in 1 / m^2.
 
     J is the change of a pixel's signed residual, in tolerances and at most 1, while the object
     moves, turns and grows by STEP_M at its surface, there and back. At outlines pixels change
     hands, which counts as much as a tolerance.
     """
-    n, evidence, tolerance = len(longest), cost.evidence, cost.weights.tolerance_m
+    n, evidence, tolerance = len(rows), cost.evidence, cost.weights.tolerance_m
     moves = np.concatenate([np.eye(9), -np.eye(9)]) * STEP_M
-    own = np.repeat(np.arange(n), len(moves))
+    own = np.repeat(rows, len(moves))
     flat = np.tile(moves, (n, 1))
     H, half = cost.H[own], longest[own, None] / 2
     H[:, :3] += flat[:, :3]
@@ -157,16 +160,16 @@ def _information(cost: _Cost, longest: Float64Array) -> Float64Array:
 
 
 def _flip_probabilities(cost: _Cost, objects: Candidates, models: Sequence[GenericModel],
-                        rng: np.random.Generator) -> Float64Array:
-    """Return (n,) how likely a half turn of the answer is the true orientation."""
-    turned, rows = half_turns(objects, models)
-    H = np.concatenate([cost.H, hypotheses_of(turned, cost.evidence.shapes)])
-    own = np.concatenate([np.arange(len(objects)), rows])
+                        rng: np.random.Generator, rows: Int64Array) -> Float64Array:
+    """Return (rows,) how likely a half turn of the answer is the true orientation."""
+    turned, of_row = half_turns(objects.take(rows), models)
+    H = np.concatenate([cost.H[rows], hypotheses_of(turned, cost.evidence.shapes)])
+    own = np.concatenate([rows, rows[of_row]])
     costs, shown = cost.of(cost.refined(H, own, rng), own)
-    out, n = np.zeros(len(objects)), len(objects)
-    for k in range(n):
+    out, n = np.zeros(len(rows)), len(rows)
+    for i, k in enumerate(rows):
         others = np.flatnonzero(own[n:] == k) + n
         if len(others):
-            rise = (costs[others].min() - costs[k]) / max(shown[k], 1.0)
-            out[k] = 1 / (1 + np.exp((rise - FLIP_EVEN) / FLIP_WIDTH))
+            rise = (costs[others].min() - costs[i]) / max(shown[i], 1.0)
+            out[i] = 1 / (1 + np.exp((rise - FLIP_EVEN) / FLIP_WIDTH))
     return out

@@ -4,7 +4,7 @@
 
 from dataclasses import dataclass
 
-from hooc_perception.core.config import Config, param
+from hooc_perception.core.config import Config, group, param
 from hooc_perception.core.segment.regions import workspace_of
 from hooc_perception.errors import HoocError
 
@@ -12,8 +12,28 @@ MOST_RADIUS_M = 3.0
 
 
 @dataclass(frozen=True)
+class AccumulateConfig(Config):
+    """How the readings of successive frame sets are put together; only `update` does so."""
+
+    accumulate_frames: int = param(
+        12, 'While a scene stands still, depth is averaged over as many frame sets; it starts '
+        'again where something changes. 1 = every frame set by itself.', '', 1, 200, runtime=True)
+    largest_object_m: float = param(
+        0.5, 'What comes into the scene and is longer than this is an arm or a hand, no object; '
+        'so is what is half as long and reaches beyond the image or the workspace. It is set '
+        'aside until it has gone.', 'm', 0.05, 3.0, runtime=True)
+    full_share: float = param(
+        0.4, 'If more than this share of the foreground has changed, nothing is taken over from '
+        'the previous frame set.', '', 0.0, 1.0, runtime=True)
+
+
+@dataclass(frozen=True)
 class ObserveConfig(Config):
-    """Parameters of stage 1: rectification, support plane, background subtraction."""
+    """
+    Parameters of stage 1: rectification, support plane, background subtraction.
+
+    :ivar accumulate: of several frame sets.
+    """
 
     max_depth_m: float = param(4.0, 'Readings beyond this depth are discarded.', 'm', 0.3, 20.0)
     table_band_m: float = param(
@@ -59,6 +79,7 @@ class ObserveConfig(Config):
         'of the target frame; 180 = z is not up (an optical frame), so the upper edges of the '
         'images tell which way is up, and neither bound of z applies.', 'deg', 0.0, 180.0,
         runtime=True)
+    accumulate: AccumulateConfig = group(AccumulateConfig())
 
     def __post_init__(self) -> None:
         """Raise HoocError where a parameter is out of its range, or a region is none."""

@@ -159,6 +159,23 @@ def tracked(table: Table, views: Sequence[RectifiedView], config: ObserveConfig)
     return measured(replace(table, T_target_table=T, residual_m=sigma), views, config)
 
 
+def next_table(table: Table | None, views: Sequence[RectifiedView],
+               config: ObserveConfig) -> Table:
+    """
+    Return the Table of a frame set that follows another one with the same parameters.
+
+    A table that is in place is kept to the bit, so that results do not move with it; one that
+    has gone is looked for anew.
+
+    :param table: of the frame set before; None = there was none.
+    :param views: posed in the target frame.
+    :raises HoocError: where it has to be found and is not there.
+    """
+    if table is not None and config.table == 'find':
+        table = tracked(table, views, config)
+    return locate_table(views, config) if table is None else table
+
+
 class TableTracker:
     """
     Follows the table over frame sets.
@@ -172,10 +189,7 @@ class TableTracker:
 
     def update(self, views: Sequence[RectifiedView], config: ObserveConfig) -> Table:
         """
-        Return the Table of the next frame set.
-
-        A table that is in place is kept to the bit, so that results do not move with it; one
-        that has gone is looked for anew.
+        Return the Table of the next frame set, see `next_table`.
 
         :param views: posed in the target frame.
         :raises HoocError: where it has to be found and is not there; it is looked for again in
@@ -183,10 +197,9 @@ class TableTracker:
         """
         if config != self._config:
             self.table, self._config = None, config
-        if self.table is not None and config.table == 'find':
-            self.table = tracked(self.table, views, config)
-        if self.table is None:
-            self.table = locate_table(views, config)
+        # A table that is lost is not remembered.
+        before, self.table = self.table, None
+        self.table = next_table(before, views, config)
         return self.table
 
 

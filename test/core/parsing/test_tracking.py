@@ -68,14 +68,29 @@ def test_what_vanishes_comes_back_with_its_id_until_its_time_is_over(things):
     assert late[1] == b and late[0] not in (a, b)
 
 
-def test_a_long_way_or_another_category_is_another_object(things):
+def test_another_category_or_another_size_is_another_object(things):
     tracker = Tracker(things, TrackConfig(track_reach_m=0.1))
-    (a,), _ = tracker.update(0, found(things, (CAN, (0, 0, 0.06), up())))
-    (b,), _ = tracker.update(S, found(things, (CAN, (0.11, 0, 0.06), up())))
-    (c,), _ = tracker.update(2 * S, found(things, (BALL, (0.11, 0, 0.06), up())))
-    # The can is still remembered where it last was, and takes its id back.
-    (d,), _ = tracker.update(3 * S, found(things, (CAN, (0.12, 0, 0.06), up())))
-    assert len({a, b, c}) == 3 and d == b
+    can = found(things, (CAN, (0, 0, 0.06), up()))
+    (a,), _ = tracker.update(0, can)
+    (b,), _ = tracker.update(S, found(things, (BALL, (0.02, 0, 0.06), up())))
+    far = found(things, (CAN, (0.5, 0, 0.06), up()))
+    (c,), _ = tracker.update(2 * S, replace(far, size=1.5 * far.size))
+    assert len({a, b, c}) == 3
+
+
+def test_what_is_carried_elsewhere_keeps_its_id_if_it_has_vanished(things):
+    tracker = Tracker(things, TrackConfig(track_reach_m=0.1, track_ttl_s=10.0))
+    here, there = (CAN, (0, 0, 0.06), up()), (CAN, (0.5, 0, 0.06), up())
+    (a,), _ = tracker.update(0, found(things, here))
+    # Both are there: the one that stays keeps the id.
+    (b, c), _ = tracker.update(S, found(things, there, here))
+    assert c == a and b != a
+    # The second one is carried to a third place while the first one stays.
+    (d, e), _ = tracker.update(2 * S, found(things, here, (CAN, (0, 0.4, 0.06), up())))
+    assert (d, e) == (a, b)
+    # Taken away, and put down elsewhere later.
+    assert tracker.update(3 * S, found(things, here))[0].tolist() == [a]
+    assert tracker.update(5 * S, found(things, here, there))[0].tolist() == [a, b]
 
 
 def test_a_clock_that_jumps_back_forgets_and_never_repeats_an_id(things):

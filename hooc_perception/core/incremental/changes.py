@@ -1,0 +1,112 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""
+Change detection between two depth images of one camera that stands still.
+
+Depth is compared in the mean over a small window, relative to the noise of the image itself, so
+that a knife on the table is noticed where no single pixel exceeds the noise. Depth edges flicker
+by far more than noise and are left out.
+"""
+
+from collections.abc import Sequence
+
+from hooc_perception.core.arrays import BoolArray, Float32Array
+from hooc_perception.core.incremental.kernels.windows import at_edges, compare_windows
+from hooc_perception.core.types import Camera, Observation
+import numpy as np
+from scipy import ndimage
+
+# The share of a window that must have been measured twice.
+LEAST_SHARE = 0.4
+# Depth that differs by more than this within 3 x 3 pixels, per metre of depth, is an edge.
+EDGE = 0.015
+# A window has changed if its mean differs by this multiple of the noise, which grows with the
+# square of the distance; within these bounds. [m]
+STRONG, LEAST_M, MOST_M = 7.0, 0.003, 0.03
+# A single difference counts as no more than this: flying pixels are as rare as they are wrong.
+CLIP_M = 0.05
+# Of a window that was measured before and is not now, or the reverse, this share must be so.
+APPEARED = 0.8
+# Connected changes of fewer pixels are noise.
+FEWEST_PX = 12
+# Levelling moves a camera by fractions of a millimetre from frame set to frame set; more than this
+# is another pose. [m; entries of the rotation matrix]
+SAME_PLACE_M, SAME_TURN = 0.005, 0.005
+
+
+def changed_pixels(before: Float32Array, now: Float32Array) -> BoolArray:
+    """
+    Return which pixels (H, W) show something else than before.
+
+    :param before, now: (H, W) float32 metres, NaN = none.
+    """
+    before, now = (np.ascontiguousarray(depth, np.float32) for depth in (before, now))
+    edges = at_edges(before, EDGE) | at_edges(now, EDGE)
+    shift, share, appeared, gone = compare_windows(before, now, edges, CLIP_M)
+    mean, enough = np.abs(shift) / np.maximum(share, 1e-6), share >= LEAST_SHARE
+    square = np.fmin(before, now) ** 2
+    sample = enough & np.isfinite(before) & np.isfinite(now)
+    # Changes are a small part of an image: the median is the noise. [m at 1 m]
+    noise = 1.48 * float(np.median(mean[sample] / square[sample])) if sample.any() else 0.0
+    with np.errstate(invalid='ignore'):
+        changed = enough & (mean > np.clip(STRONG * noise * square, LEAST_M, MOST_M))
+    changed |= (appeared >= APPEARED) | (gone >= APPEARED)
+    if not changed.any():
+        return changed
+    # The mean of a window spreads over its border: what differs there belongs to the change.
+    changed = np.asarray(ndimage.binary_dilation(changed, np.ones((3, 3), bool)), bool)
+    return _large(changed)
+
+
+def changes(before: Observation, now: Observation) -> tuple[BoolArray, ...]:
+    """
+    Return, per view, which foreground pixels (H, W) of either observation have changed.
+
+    Pixels that the robot or something else hides in either of them tell nothing.
+
+    :raises ValueError: where the views are not of the same cameras, see `comparable`.
+    """
+    if not comparable(before, now):
+        raise ValueError('these are observations of different cameras')
+    masks = []
+    for a, b in zip(before.views, now.views):
+        mask = changed_pixels(a.depth, b.depth)
+        mask &= np.asarray(ndimage.binary_dilation(a.foreground | b.foreground), bool)
+        for hidden in (a.hidden, b.hidden):
+            if hidden is not None:
+                mask &= ~hidden
+        masks.append(_large(mask))
+    return tuple(masks)
+
+
+def changed_share(before: Observation, now: Observation, masks: Sequence[BoolArray]) -> float:
+    """Return the share of the foreground of both observations that has changed, 0 to 1."""
+    total = sum(int((a.foreground | b.foreground).sum())
+                for a, b in zip(before.views, now.views))
+    return sum(int(mask.sum()) for mask in masks) / max(total, 1)
+
+
+def comparable(before: Observation, now: Observation) -> bool:
+    """Return whether two observations are of the same cameras in the same places."""
+    return len(before.views) == len(now.views) and all(
+        same_camera(a.camera, b.camera) for a, b in zip(before.views, now.views))
+
+
+def same_camera(before: Camera, now: Camera) -> bool:
+    """Return whether a camera is the same and stands where it stood."""
+    moved = np.abs(before.T_world_camera - now.T_world_camera)
+    return ((before.name, before.width, before.height) == (now.name, now.width, now.height)
+            and np.array_equal(before.K, now.K)
+            and float(moved[:3, 3].max()) < SAME_PLACE_M
+            and float(moved[:3, :3].max()) < SAME_TURN)
+
+
+def _large(mask: BoolArray) -> BoolArray:
+    """Return the pixels (H, W) of connected parts that are no noise."""
+    if not mask.any():
+        return mask
+    labels = np.empty(mask.shape, np.int32)
+    ndimage.label(mask, np.ones((3, 3), int), output=labels)
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    return sizes[labels] >= FEWEST_PX

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from hooc_perception.errors import HoocError
 
-HELP = ('Write a scene set or BOP dataset as rosbag2 bags, one per scene; or calibrations of '
-        "Bouguet's toolbox as a cameras.yaml.")
+HELP = ('Write a scene set or BOP dataset as rosbag2 bags, one per sequence and one per other '
+        "scene; or calibrations of Bouguet's toolbox as a cameras.yaml.")
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -19,14 +19,15 @@ def add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument('--out', type=Path, required=True, metavar='DIR',
                         help='folder for the bags; with --calibration, the cameras.yaml to write')
     parser.add_argument('--scene', action='extend', default=[], metavar='ID', nargs='+',
-                        help='only these scenes')
+                        help='only these scenes, or all of these sequences')
     parser.add_argument('--storage', choices=('mcap', 'sqlite3'), default='mcap',
                         help='storage format of the bags (default: %(default)s)')
     parser.add_argument('--repeat', type=int, default=1, metavar='N',
-                        help='frame sets per bag: the same images with new stamps (default: '
-                        '%(default)s)')
+                        help='frame sets per bag of a single scene: the same images with new '
+                        'stamps (default: %(default)s)')
     parser.add_argument('--rate', type=float, default=10.0, metavar='HZ',
-                        help='frame sets per second (default: %(default)g)')
+                        help='frame sets per second of such a bag (default: %(default)g); '
+                        'sequences keep their own period')
     parser.add_argument('--calibration', action='extend', default=[], metavar='NAME=FILE[#VIEW]',
                         nargs='+', help="instead of SET: Calib_Results.mat or .m of Bouguet's "
                         'toolbox, one per camera; VIEW is the calibration image in which the '
@@ -47,17 +48,24 @@ def run(args: Namespace) -> None:
 
 
 def write_bags(args: Namespace) -> None:
-    """Write one bag per scene."""
+    """Write one bag per sequence, and one per scene that is in none."""
     from hooc_perception.cli.places import folder_place
-    from hooc_perception.io.bags.writer import write_bag
+    from hooc_perception.io.bags.writer import write_bag, write_sequence
     from hooc_perception.io.scenes.scene_set import load_scene_set
     from tqdm import tqdm
 
     folder_place(args.out, '--out')
     scene_set = load_scene_set(args.set).selected(args.scene)
-    for scene in tqdm(scene_set.scenes, desc='bags', unit='scene'):
-        write_bag(scene, scene_set, args.out, args.storage, args.repeat, args.rate)
-    count = len(scene_set.scenes)
+    inside = {name for sequence in scene_set.sequences for name in sequence.scenes}
+    single = [scene for scene in scene_set.scenes if scene.name not in inside]
+    count = len(single) + len(scene_set.sequences)
+    with tqdm(total=count, desc='bags', unit='bag') as progress:
+        for sequence in scene_set.sequences:
+            write_sequence(sequence, scene_set, args.out, args.storage)
+            progress.update()
+        for scene in single:
+            write_bag(scene, scene_set, args.out, args.storage, args.repeat, args.rate)
+            progress.update()
     print(f'{count} bag{"s" * (count != 1)} in {args.out}')
 
 

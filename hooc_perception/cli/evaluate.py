@@ -110,7 +110,7 @@ def _tables(evaluations: Sequence['Evaluation'], scene_set: 'SceneSet',
             visibility: dict[str, list['Visibility']],
             truth_energy: dict[str, 'Energy']) -> list['Table']:
     """Return every table that there are figures for."""
-    from hooc_perception.evaluation import certainty, open_world, paper_tables
+    from hooc_perception.evaluation import certainty, open_world, paper_tables, sequences
     from hooc_perception.evaluation.shape_table import shape_table
 
     tables: list[Table | None] = [
@@ -120,7 +120,9 @@ def _tables(evaluations: Sequence['Evaluation'], scene_set: 'SceneSet',
         tables += [paper_tables.paper_scores(),
                    paper_tables.energy_table(evaluations, truth_energy),
                    paper_tables.strict_table(evaluations), shape_table(evaluations),
-                   open_world.open_table([(e.label, e.open_world) for e in evaluations])]
+                   open_world.open_table([(e.label, e.open_world) for e in evaluations]),
+                   *sequences.tables_of([(e.label or 'results', sequences.summary(e.sequences))
+                                         for e in evaluations if e.sequences])]
     for e in evaluations:
         if e.scores:
             tables += [paper_tables.category_table(e, scene_set.category_names),

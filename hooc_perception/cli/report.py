@@ -122,6 +122,7 @@ def _source(args: Namespace, results: dict[str, Any], folder: 'ModelFolder | Non
         return _Source(scene_set.name, place, scene_set.scenes, models,
                        lambda scene, entry: scene.depth())
     from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.io.bags.sequences import frame_sets
     wanted = args.scene or [entry['scene'] for entry in results['scenes']]
     bags = {entry['scene']: bag for entry in results['scenes']
             if entry['scene'] in wanted and (bag := _named(base, entry, 'bag'))}
@@ -130,8 +131,10 @@ def _source(args: Namespace, results: dict[str, Any], folder: 'ModelFolder | Non
     if not bags or known is None:
         raise HoocError(f'{args.results} names neither a scene set nor bags that still exist; '
                         'name the set with --set')
-    return _Source(results['dataset'], 'its bags', [BagScene(bag) for bag in bags.values()],
-                   {m.name: m for m in known}, _answered_views)
+    scenes = [scene for bag in map(BagScene, dict.fromkeys(bags.values()))
+              for scene in (bag, *frame_sets(bag)) if scene.name in bags]
+    return _Source(results['dataset'], 'its bags', scenes, {m.name: m for m in known},
+                   _answered_views)
 
 
 def _answered_views(bag: 'BagScene', entry: dict[str, Any]) -> 'Sequence[DepthView]':

@@ -2,24 +2,31 @@
 # SPDX-License-Identifier: Apache-2.0
 """What `hooc parse` reads: a scene set, a BOP dataset, or a bag."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.folder import is_bag
 from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.io.bags.sequences import frame_sets, recorded_sequence
 from hooc_perception.io.scenes.scene_set import load_scene_set, SceneSet
+from hooc_perception.io.scenes.sequences import (
+    RecordedSequence,
+    scenes_named,
+    whole_sequences,
+)
 from hooc_perception.trained.folder import ModelFolder
 
 
 @dataclass(frozen=True, eq=False)
 class BagSet:
     """
-    The one scene of a bag, with those fields of a SceneSet that parsing reads.
+    The scenes of a bag, with those fields of a SceneSet that parsing reads.
 
     :ivar category_names: what the bag says may stand in its scene; empty where it says nothing.
     :ivar max_instances: objects of one category that the scene may hold, 0 = no limit.
-    :ivar scenes: the one BagScene.
+    :ivar scenes: the frame sets of the sequence that the bag holds; of other bags, the first one.
+    :ivar sequences: the one that the bag holds, if it does.
     """
 
     path: Path
@@ -27,14 +34,20 @@ class BagSet:
     category_names: tuple[str, ...]
     max_instances: int
     scenes: tuple[BagScene, ...]
+    sequences: tuple[RecordedSequence, ...] = ()
 
     def selected(self, names: list[str] | None) -> 'BagSet':
-        """Return this set; raise HoocError where `names` asks for another scene."""
-        for name in names or ():
-            if name != self.scenes[0].name:
+        """Return a set of these scenes, as `SceneSet.selected` does."""
+        if not names:
+            return self
+        names = scenes_named(names, self.sequences)
+        known = {scene.name: scene for scene in self.scenes}
+        for name in names:
+            if name not in known:
                 raise HoocError(f'{self.path}: there is no scene {name!r}; the bag holds '
-                                f'{self.scenes[0].name}')
-        return self
+                                f'{", ".join([*known][:20])}')
+        return replace(self, scenes=tuple(known[name] for name in names),
+                       sequences=whole_sequences(self.sequences, names))
 
 
 def load_source(path: str | Path, model: ModelFolder) -> SceneSet | BagSet:
@@ -52,7 +65,8 @@ def load_source(path: str | Path, model: ModelFolder) -> SceneSet | BagSet:
     limit = bag.info['max_instances']
     names = bag.info['categories'] or [generic.name for generic in model.models]
     return BagSet(path, bag.info['dataset'], tuple(names),
-                  limit if limit >= 0 else model.max_instances, (bag,))
+                  limit if limit >= 0 else model.max_instances, frame_sets(bag) or (bag,),
+                  (sequence,) if (sequence := recorded_sequence(bag)) else ())
 
 
 def provenance(source: SceneSet | BagSet, model: str | Path,

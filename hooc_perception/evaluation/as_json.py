@@ -8,7 +8,7 @@ import math
 from typing import Any
 
 from hooc_perception.core.types import Energy
-from hooc_perception.evaluation import open_world, paper
+from hooc_perception.evaluation import open_world, paper, sequences
 from hooc_perception.evaluation.certainty import certainty_summary
 from hooc_perception.evaluation.evaluate import Evaluation
 from hooc_perception.evaluation.paper_tables import TERMS
@@ -49,6 +49,8 @@ def as_json(scene_set: SceneSet, evaluations: Sequence[Evaluation],
                       'certainty': certainty_summary(e), 'shape': _shape(e)}
         if e.open_world:
             entry['open_world'] = open_world.summary(e.open_world)
+        if e.sequences:
+            entry['sequences'] = sequences.summary(e.sequences)
         if e.masks:
             entry['masks'] = [asdict(m) for m in e.masks]
         if e.bop:

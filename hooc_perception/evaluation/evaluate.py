@@ -16,6 +16,7 @@ from hooc_perception.evaluation.masks import MaskScore, score_masks
 from hooc_perception.evaluation.matching import in_frame_of, posed, PosedObject
 from hooc_perception.evaluation.open_world import open_score, OpenScore
 from hooc_perception.evaluation.scores import per_category, SceneScore, score_scene
+from hooc_perception.evaluation.sequences import Frame, sequence_score, SequenceScore
 from hooc_perception.evaluation.shape import shape_errors, ShapeError
 from hooc_perception.evaluation.visibility import scene_visibility, Visibility
 from hooc_perception.io.scenes.scene_set import RecordedScene, SceneSet
@@ -43,6 +44,7 @@ class Evaluation:
     :ivar bop: None where it was not computed.
     :ivar shapes: {scene: errors of size and surface of its localized objects}.
     :ivar open_world: of the scenes whose things of no category are known.
+    :ivar sequences: of the sequences all of whose scenes have poses.
     """
 
     label: str
@@ -54,6 +56,7 @@ class Evaluation:
     bop: BopScore | None = None
     shapes: dict[str, list[ShapeError]] = field(default_factory=dict)
     open_world: tuple[OpenScore, ...] = ()
+    sequences: tuple[SequenceScore, ...] = ()
 
     def per_category(self, categories: Iterable[str]) -> dict[str, dict[str, Any]]:
         """Return `scores.per_category` of all scenes with poses."""
@@ -146,7 +149,19 @@ def evaluate_results(scene_set: SceneSet, results: Mapping[str, Any],
             masks.append(_masks(scene, found, models, about))
     setting = str(results.get('setting', 'A')).upper()
     return Evaluation(label, setting, tuple(scores), tuple(masks), estimates, energy,
-                      bop_score(targets) if targets else None, shapes, tuple(opens))
+                      bop_score(targets) if targets else None, shapes, tuple(opens),
+                      _sequences(scene_set, scores, estimates, models))
+
+
+def _sequences(scene_set: SceneSet, scores: Iterable[SceneScore],
+               estimates: Mapping[str, list[PosedObject]],
+               models: Mapping[str, GenericModel]) -> tuple[SequenceScore, ...]:
+    """Return the SequenceScores of a set; `scores` are of its scenes with poses."""
+    by_name = {score.name: score for score in scores}
+    return tuple(sequence_score(sequence, [
+        Frame(by_name[name], scene_set.scene(name).truth or (), estimates[name])
+        for name in sequence.scenes], models)
+        for sequence in scene_set.sequences if set(sequence.scenes) <= set(by_name))
 
 
 def _masks(scene: RecordedScene, found: list[PosedObject], models: Mapping[str, GenericModel],

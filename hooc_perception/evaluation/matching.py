@@ -26,6 +26,7 @@ class PosedObject:
     :ivar sigma_t, sigma_r: of an estimate, metres and radians; NaN where unknown.
     :ivar member: of an estimate, which mesh of its category's family was found; 0 = the generic
         one.
+    :ivar id: of an estimate, what it is called in successive results; None where it has no id.
     """
 
     category: str
@@ -36,6 +37,7 @@ class PosedObject:
     sigma_t: float = float('nan')
     sigma_r: float = float('nan')
     member: int = 0
+    id: int | None = None
 
 
 def posed(thing: Any) -> PosedObject:
@@ -50,7 +52,8 @@ def posed(thing: Any) -> PosedObject:
                            np.asarray(get('size'), np.float64).reshape(3),
                            1.0 if score is None else float(score),
                            *(float('nan') if sigma is None else float(sigma)
-                             for sigma in sigmas), member=int(get('member') or 0))
+                             for sigma in sigmas), member=int(get('member') or 0),
+                           id=get('id'))
     except (TypeError, ValueError) as error:
         raise HoocError(f'object {get("category")!r} has no usable pose: {error}; give '
                         'translation (3), rotation_xyzw (4) and size (3)') from None

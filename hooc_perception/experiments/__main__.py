@@ -23,7 +23,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--set', action='append', default=[], metavar='NAME[=FOLDER]',
                         help='a set to evaluate; twin needs no folder (default: twin)')
     parser.add_argument('--rows', nargs='+', metavar='ROW',
-                        help=f'only these rows of {", ".join(plan.ROWS)} (default: all; '
+                        help=f'only these rows of {", ".join(plan.ROWS)} and, of sets with '
+                             f'sequences, {plan.INCREMENTAL} (default: all; '
                              + '; '.join(f'of {name}: {", ".join(rows)}'
                                          for name, rows in plan.ROWS_OF.items()) + ')')
     parser.add_argument('--keep', nargs='+', default=[], metavar='ROW',

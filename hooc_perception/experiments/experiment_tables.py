@@ -15,7 +15,7 @@ import numpy as np
 # Settings in the order of the tables, and what these call them.
 SETTINGS = {'A': 'A', 'B': 'B', ablations.UNVERIFIED: 'B, no verifier'}
 # Sets in the order of the tables, those of objects unlike the generic models first.
-SETS = ('shapes', 'osd', 'dev', 'twin')
+SETS = ('shapes', 'osd', 'moves', 'dev', 'twin')
 
 
 def summary_of(name: str, posed: dict[str, Scores], masked: dict[str, Scores],

@@ -15,12 +15,13 @@ import shutil
 from typing import Any
 
 from hooc_perception.errors import HoocError
+from hooc_perception.evaluation import sequences
 from hooc_perception.evaluation.tables import to_markdown
 from hooc_perception.evaluation.worst import worst_table
 from hooc_perception.experiments import ablations
 from hooc_perception.experiments.detail_tables import details_of
 from hooc_perception.experiments.experiment_tables import step_table, summary_of
-from hooc_perception.experiments.plan import Layout, PROFILES, SCORED
+from hooc_perception.experiments.plan import INCREMENTAL, Layout, PROFILES, SCORED
 from hooc_perception.experiments.records import Record
 from hooc_perception.io.scenes.files import write_atomically
 
@@ -44,8 +45,13 @@ def sections_of(root: str | Path, sets: Iterable[str],
     out = {}
     for name in sets:
         layout = Layout(Path(root), name)
-        scores = _contents({row: layout.scores(row) for row in SCORED})
-        if scores:
+        scores = _contents({row: layout.scores(row) for row in (*SCORED, INCREMENTAL)})
+        moving = {row: s['results'][0]['sequences'] for row, s in scores.items()
+                  if 'sequences' in s['results'][0]}
+        if moving:
+            out[name] = '\n'.join(map(to_markdown, sequences.tables_of(
+                [(f'`{row}`', figures) for row, figures in moving.items()])))
+        elif scores:
             posed, masked = ({row: s for row, s in scores.items() if key in s['results'][0]}
                              for key in ('mean', 'masks'))
             stages = _contents({row: layout.stages(row) for row in PROFILES if row in posed})

@@ -21,10 +21,11 @@ from hooc_perception.io.scenes.scene_set import load_scene_set
 BASELINES = ('fpfh', 'ppf')
 SCORED = PROFILES + BASELINES
 ROWS = SCORED + (ABLATIONS,)
+INCREMENTAL = 'incremental'
 # Profiles that have a verifier.
 VERIFIED = ('best', 'fast')
-# Of a set that is not listed here, all rows are made where none are asked for.
-ROWS_OF = {'shapes': ('best', 'fast')}
+# Of a set that is not listed here, all of ROWS are made where none are asked for.
+ROWS_OF = {'shapes': ('best', 'fast'), 'moves': ('best', INCREMENTAL)}
 
 # Modules whose code, with all that they import, a kind of step runs.
 _SETS = 'hooc_perception.io.scenes.scene_set'
@@ -111,12 +112,14 @@ class _SetPlan:
     """
     What the steps of one set have in common.
 
-    :ivar path: folder of the set; `posed` says whether some of its scenes have true poses.
+    :ivar path: folder of the set; `posed` says whether some of its scenes have true poses,
+        `moving` whether it has sequences.
     """
 
     layout: Layout
     path: Path
     posed: bool
+    moving: bool
     seed: str
     jobs: str
 
@@ -124,6 +127,8 @@ class _SetPlan:
         """Return the steps of one row."""
         if row == ABLATIONS:
             return self._ablations()
+        if row == INCREMENTAL:
+            return self._incremental()
         return self._baseline(row) if row in BASELINES else self._profile(row)
 
     def _step(self, row: str, what: str, kind: str, arguments: Iterable[str | Path],
@@ -135,7 +140,8 @@ class _SetPlan:
 
     def _scores(self, row: str, answers: Sequence[Path], model: Path | None = None) -> Step:
         """Return the step that scores the answers of a row."""
-        more: list[str | Path] = ['--bop'] if self.posed and '/' not in row else []
+        more: list[str | Path] = (
+            ['--bop'] if self.posed and not self.moving and '/' not in row else [])
         if model:
             more += ['--model', model]
         return self._step(row, 'scores', 'scores with energy' if model else 'scores',
@@ -155,9 +161,9 @@ class _SetPlan:
         out = [self._step(row, 'train', 'train',
                           ['train', path, '--profile', row, '--seed', self.seed, '--jobs',
                            self.jobs], [], model)]
-        parse = ['parse', path, '--model', model, '--profile', row, '--seed', self.seed]
+        parse = self._parse(row)
         out.append(self._step(row, 'A', 'parse', parse, [model], answers[0]))
-        if not self.posed:
+        if self.moving or not self.posed:
             return [*out, self._scores(row, answers)]
         for setting, more in _true_pose_settings(row).items():
             answers.append(self.layout.results(row, setting))
@@ -167,14 +173,25 @@ class _SetPlan:
                 self._step(row, 'stages', 'stages', ['stages', path, '--model', model], [model],
                            self.layout.stages(row))]
 
+    def _parse(self, profile: str) -> list[str | Path]:
+        """Return the command that parses the set with a profile and its model."""
+        return ['parse', self.path, '--model', self.layout.model(profile), '--profile', profile,
+                '--seed', self.seed]
+
+    def _incremental(self) -> list[Step]:
+        """Return the steps of the row `incremental`."""
+        answer = self.layout.results(INCREMENTAL, 'A')
+        return [self._step(INCREMENTAL, 'A', 'parse', [*self._parse('best'), '--incremental'],
+                           [self.layout.model('best')], answer),
+                self._scores(INCREMENTAL, [answer])]
+
     def _ablations(self) -> list[Step]:
         """Return the steps of the row `ablations`: two for every switch."""
         out, model = [], self.layout.model('best')
         for switch in SWITCHES:
             answer = self.layout.results(switch.row, 'A')
-            out += [self._step(switch.row, 'A', 'parse',
-                               ['parse', self.path, '--model', model, '--profile', 'best',
-                                '--seed', self.seed, *_changed(switch)], [model], answer),
+            out += [self._step(switch.row, 'A', 'parse', [*self._parse('best'), *_changed(switch)],
+                               [model], answer),
                     self._scores(switch.row, [answer])]
         return out
 
@@ -211,35 +228,42 @@ def steps_of(sets: Mapping[str, str | Path | None], root: str | Path,
 
     :param sets: {name: folder, or None for the twin, which is then written first}.
     :param root: folder of everything that is computed.
-    :param rows: None = those of ROWS_OF, and all of a set that it does not name.
+    :param rows: None = those of ROWS_OF, and all of ROWS for a set that it does not name. Sets
+        that have none of them are passed over.
     :raises HoocError: where a row or a set does not exist.
     """
     for row in rows or ():
-        if row not in ROWS:
-            raise HoocError(f'there is no row {row!r}; choose among {", ".join(ROWS)}')
+        if row not in (*ROWS, INCREMENTAL):
+            raise HoocError(f'there is no row {row!r}; choose among {", ".join(ROWS)}, '
+                            f'{INCREMENTAL}')
     out = []
     for name, folder in sets.items():
-        layout = Layout(Path(root), name)
+        layout, steps = Layout(Path(root), name), []
         if folder is None:
             if name != 'twin':
                 raise HoocError(f'the set {name} needs a folder: {name}=FOLDER; only the twin '
                                 'is written here')
-            path, posed = layout.twin, True
-            out.append(Step(f'{name}/set', 'set', 'twin',
-                            ('twin', '--out', path, '--seed', str(seed)), (), path))
+            path, posed, moving = layout.twin, True, False
+            steps.append(Step(f'{name}/set', 'set', 'twin',
+                              ('twin', '--out', path, '--seed', str(seed)), (), path))
         else:
-            path = Path(folder)
-            posed = any(scene.truth for scene in load_scene_set(path).scenes)
-        plan = _SetPlan(layout, path, posed, str(seed), str(jobs))
-        wanted = _with_best(layout, ROWS_OF.get(name, ROWS) if rows is None else rows)
+            path, scene_set = Path(folder), load_scene_set(folder)
+            posed = any(scene.truth for scene in scene_set.scenes)
+            moving = bool(scene_set.sequences)
+        plan = _SetPlan(layout, path, posed, moving, str(seed), str(jobs))
+        asked = ROWS_OF.get(name, ROWS) if rows is None else rows
+        wanted = _with_best(layout, [row for row in asked if moving or row != INCREMENTAL])
         for row in wanted:
-            out += plan.row(row)
-        if posed:
-            out += plan.pictures(wanted)
+            steps += plan.row(row)
+        if posed and not moving:
+            steps += plan.pictures(wanted)
+        out += steps if wanted else ()
     return out
 
 
 def _with_best(layout: Layout, rows: Sequence[str]) -> list[str]:
-    """Return the rows in the order of ROWS, with `best` where its ablations lack it."""
-    needed = () if layout.model('best').exists() and layout.scores('best').exists() else ('best',)
-    return [row for row in ROWS if row in rows or ABLATIONS in rows and row in needed]
+    """Return the rows in the order of ROWS, with `best` where rows that need it lack it."""
+    there = layout.model('best').exists() and layout.scores('best').exists()
+    needs_best = not there and not {ABLATIONS, INCREMENTAL}.isdisjoint(rows)
+    return [row for row in (*ROWS, INCREMENTAL)
+            if row in rows or needs_best and row == 'best']

@@ -5,12 +5,14 @@
 from hooc_perception.cli.main import main
 from hooc_perception.core.types import Camera
 from hooc_perception.io.bags.reader import BagScene, topics
+from hooc_perception.io.bags.sequences import frame_sets
 from hooc_perception.io.scenes.camera_files import load_cameras
 from hooc_perception.io.scenes.scene_set import NewScene, write_scene_set
 import numpy as np
 import pytest
 from scipy.io import savemat
 import trimesh
+import yaml
 
 
 @pytest.fixture
@@ -49,6 +51,21 @@ def test_chosen_scenes_storage_and_repetition(scene_set, tmp_path):
     assert topics(out / 'a')['/hooc/left/depth/image_raw'].count == 2
 
 
+def test_a_sequence_becomes_one_bag_and_other_scenes_one_each(scene_set, tmp_path, capsys):
+    (scene_set / 'sequences.yaml').write_text(
+        yaml.safe_dump([{'name': 's', 'period_s': 0.5, 'scenes': ['c', 'a']}]))
+    out = tmp_path / 'bags'
+    assert main(['convert', str(scene_set), '--out', str(out), '--repeat', '3']) == 0
+    assert sorted(bag.name for bag in out.iterdir()) == ['b', 's']
+    assert '2 bags' in capsys.readouterr().out
+    assert [frame.name for frame in frame_sets(BagScene(out / 's'))] == ['c', 'a']
+    assert topics(out / 'b')['/hooc/left/depth/image_raw'].count == 3
+    # Chosen by its name it is a sequence, part of it is not.
+    assert main(['convert', str(scene_set), '--out', str(out / 'new'), '--scene', 's']) == 0
+    assert main(['convert', str(scene_set), '--out', str(out / 'new'), '--scene', 'c']) == 0
+    assert sorted(bag.name for bag in (out / 'new').iterdir()) == ['c', 's']
+
+
 def test_calibrations_become_cameras_yaml(tmp_path):
     files = [calibration(tmp_path / side / 'Calib_Results.mat') for side in ('left', 'right')]
     out = tmp_path / 'cameras.yaml'
@@ -74,7 +91,7 @@ def test_errors_are_one_line_and_exit_1(scene_set, tmp_path, capsys, arguments, 
     arguments = [a.format(set=scene_set) for a in arguments]
     assert main(['convert', *arguments, '--out', str(tmp_path / 'out')]) == 1
     error = capsys.readouterr().err
-    lines = [line for line in error.splitlines() if 'scene/s' not in line and line.strip()]
+    lines = [line for line in error.splitlines() if 'bag/s' not in line and line.strip()]
     assert len(lines) == 1
     for word in words:
         assert word in error

@@ -2,12 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc parse` reads the bundled bag as it reads a scene set."""
 
+from argparse import Namespace
 from dataclasses import replace
 
+from hooc_perception.cli import report
 from hooc_perception.cli.sources import load_source, provenance
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.folder import is_bag
 from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.io.bags.sequences import BagFrameSet
+from hooc_perception.io.bags.writer import write_sequence
+from hooc_perception.io.scenes.scene_set import SceneSet
+from hooc_perception.io.scenes.sequences import RecordedSequence
 from hooc_perception.trained.folder import load_model_folder
 import numpy as np
 import pytest
@@ -29,12 +35,42 @@ def test_a_bag_is_a_set_of_one_scene(repository, model):
     bag = repository / 'bags/demo'
     source = load_source(bag, model)
     scene, = source.scenes
-    assert source.selected([scene.name]) is source and source.selected(None) is source
+    assert source.selected([scene.name]).scenes == source.selected(None).scenes == (scene,)
+    assert source.sequences == ()
     with pytest.raises(HoocError, match='no scene'):
         source.selected(['another'])
     assert set(source.category_names) == {generic.name for generic in model.models}
     for got, wanted in zip(scene.depth(), BagScene(bag).depth(), strict=True):
         assert np.array_equal(got.depth, wanted.depth, equal_nan=True)
+
+
+def test_a_bag_of_a_sequence_is_a_set_of_its_frame_sets(repository, model, tmp_path):
+    class Still(BagScene):
+        """The bundled scene as a frame set of another name."""
+
+        depth_units = (0.001,) * 3
+
+    frames = []
+    for name in ('b', 'a'):
+        frames.append(Still(repository / 'bags/demo'))
+        frames[-1].name = name
+    sequence = RecordedSequence('s', 0.5, ('b', 'a'), {1: 'arm in'})
+    scene_set = SceneSet(tmp_path, 'still', 'table', (), frames[0].cameras, 1, tuple(frames))
+    bag = write_sequence(sequence, scene_set, tmp_path)
+    source = load_source(bag, model)
+    assert [scene.name for scene in source.scenes] == ['b', 'a']
+    assert source.sequences == (sequence,) and source.name == 'still'
+    assert source.selected(['s']).scenes == source.scenes
+    part = source.selected(['a'])
+    assert part.scenes == source.scenes[1:] and part.sequences == ()
+    with pytest.raises(HoocError, match='no scene .c.; the bag holds b, a'):
+        source.selected(['c'])
+    # `hooc report` finds the frame set of each entry, and that of `hooc run` under the bag's name.
+    results = {'dataset': 'still', 'scenes': [{'scene': n, 'bag': 's'} for n in ('a', 's')]}
+    shown = report._source(Namespace(results=tmp_path / 'r.json', set=None, scene=[]), results,
+                           model)
+    assert [type(scene) for scene in shown.scenes] == [BagScene, BagFrameSet]
+    assert [scene.name for scene in shown.scenes] == ['s', 'a']
 
 
 def test_the_model_says_what_a_bag_does_not(repository, model, monkeypatch):

@@ -3,6 +3,7 @@
 """Which steps run again and which do not, and what the pages show."""
 
 from pathlib import Path
+import shutil
 
 from hooc_perception.cli.main import main as hooc
 from hooc_perception.core.profiles import profile
@@ -44,6 +45,43 @@ def test_shapes_are_a_set_of_their_own_model_with_fewer_rows(tmp_path, scene_set
                      *(f'shapes/best/{w}' for w in ('train', 'A', 'B', 'B_no_verifier', 'scores',
                                                     'stages')),
                      'shapes/plots', 'shapes/worst']
+
+
+@pytest.fixture
+def moving(scene_set, tmp_path):
+    """Return the folder of the small set with its scene as a sequence."""
+    path = shutil.copytree(scene_set, tmp_path / 'moving')
+    (path / 'sequences.yaml').write_text('- {name: s, scenes: [one], events: {0: placed can}}')
+    return path
+
+
+def test_a_set_with_sequences_has_answers_to_every_frame_set_only(tmp_path, moving, scene_set):
+    def names(*rows):
+        return [s.name for s in plan.steps_of({'moves': moving}, tmp_path, rows or None)]
+
+    best, on = ([f'moves/{row}/{what}' for what in ('A', 'scores')]
+                for row in ('best', 'incremental'))
+    assert names() == names('incremental') == ['moves/best/train', *best, *on]
+    assert names('best') == ['moves/best/train', *best]
+    once, again = (s for s in plan.steps_of({'moves': moving}, tmp_path) if s.name.endswith('/A'))
+    assert again.arguments[:-2] == (*once.arguments[:-2], '--incremental')
+    assert again.inputs == once.inputs and again.output != once.output
+    # Other sets have no such row, and none that it would need.
+    assert plan.steps_of({'small': scene_set, 'twin': None}, tmp_path, ('incremental',)) == []
+
+
+def test_the_page_of_a_set_with_sequences_shows_how_they_went(tmp_path, moving, write_scores):
+    root = tmp_path / 'results'
+    for row, shift in (('best', 0.0), ('incremental', 0.07)):
+        answer = plan.Layout(write_scores(row, shift), 'small').results(row, 'A')
+        assert hooc(['evaluate', str(moving), str(answer), '--json',
+                     str(plan.Layout(root, 'moves').scores(row))]) == 0
+    sections = page.sections_of(root, ['moves'], {})
+    assert set(sections) == {'moves'}
+    text = sections['moves']
+    assert [row[:4] for row in cells(text, '`best`') + cells(text, '`incremental`')] == [
+        ['best', '1.000', '0.00', '1/1'], ['incremental', '0.500', '0.00', '0/1']]
+    assert cells(text, 's 0: placed can') == [['s 0: placed can', '0', 'never']]
 
 
 def test_setting_b_without_the_verifier_is_b_with_one_parameter_changed(tmp_path, scene_set):
@@ -262,7 +300,7 @@ def test_the_pages_of_the_documentation_have_the_markers():
         names |= page.inserted(path.read_text(), {}, str(path))[1]
     assert names >= {f'{name}{what}' for name in ('shapes', 'osd', 'dev', 'twin')
                      for what in ('', ' details', ' ablations')} | {
-                         'steps', 'twin worst', 'dev worst', 'shapes worst',
+                         'moves', 'steps', 'twin worst', 'dev worst', 'shapes worst',
                          'shapes pictures'}
 
 

@@ -126,7 +126,7 @@ class BagScene(TableFrameScene):
         :raises HoocError: if an image is damaged or holds no reading, is in another unit than
             stated, or a camera does not look at the table.
         """
-        chosen = self._first_views if images is None else self._views_of(images)
+        chosen = self.source_views() if images is None else self._views_of(images)
         if self.table_known:
             check_aim(self.cameras, self.path)
             check_unit(chosen, [f'{self.path}: {topic}' for topic in self.depth_topics.values()],
@@ -178,8 +178,13 @@ class BagScene(TableFrameScene):
         return tuple(self._view(camera, topic, nearest[topic][1])
                      for camera, topic in zip(self.source_cameras, names))
 
-    def _views_of(self, images: Mapping[str, int]) -> tuple[DepthView, ...]:
-        """Return the DepthViews of images counted per camera, cameras of the source world."""
+    def _views_of(self, images: Mapping[str, int], exactly: bool = False
+                  ) -> tuple[DepthView, ...]:
+        """
+        Return the DepthViews of images counted per camera, cameras of the source world.
+
+        :param exactly: an image that cannot be used is an error, and not replaced by the next.
+        """
         cameras = {self.depth_topics[camera.name]: camera for camera in self.source_cameras}
         left = {topic: images[camera.name] for topic, camera in cameras.items()}
         views: dict[str, DepthView] = {}
@@ -192,6 +197,8 @@ class BagScene(TableFrameScene):
                 views[topic] = self._view(cameras[topic], topic,
                                           read_image(message, self.path))
             except HoocError:
+                if exactly:
+                    raise
                 continue        # ingestion has dropped it, too
             if len(views) == len(cameras):
                 return tuple(views[topic] for topic in cameras)
@@ -210,7 +217,7 @@ class BagScene(TableFrameScene):
                             f'but its first image has {camera.width} x {camera.height}; record '
                             'one resolution')
         if not np.isfinite(depth).any():
-            raise HoocError(f'{self.path}: {topic} holds no reading in its first image; '
+            raise HoocError(f'{self.path}: {topic} holds an image with no reading; '
                             'record it again')
         if trouble := depth_unit_error(depth, image.encoding, ObserveConfig().max_depth_m):
             raise HoocError(f'{self.path}: {topic}: {trouble}')

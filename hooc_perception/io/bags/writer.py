@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Write recorded scenes as rosbag2 bags (docs/bags.md)."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 import json
 from pathlib import Path
 import shutil
@@ -11,6 +11,7 @@ from typing import Any, Protocol, TYPE_CHECKING
 
 from hooc_perception.core.arrays import UInt8Array
 from hooc_perception.core.geometry import pose_from_matrix
+from hooc_perception.core.segment.checks import same_calibration
 from hooc_perception.core.types import Camera, DepthView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.bag_format import (
@@ -27,6 +28,7 @@ from hooc_perception.io.bags.bag_format import (
 from hooc_perception.io.bags.mcap_checks import write_checksums
 from hooc_perception.io.depth_encodings import encode_depth, METRES, MILLIMETRES
 from hooc_perception.io.scenes.scene import RecordedScene, TrueObject
+from hooc_perception.io.scenes.sequences import RecordedSequence
 from hooc_perception.io.scenes.writer import true_object_entry
 import numpy as np
 from rosbags.interfaces import Qos
@@ -45,6 +47,8 @@ LEAD_NS = 10 ** 8
 _SECOND_NS = 10 ** 9
 # Topic, message type and message.
 _Outgoing = tuple[str, str, Any]
+# Seconds after the first frame set, and the messages.
+_FrameSets = Iterable[tuple[float, Iterable[_Outgoing]]]
 
 
 class WritableScene(Protocol):
@@ -107,41 +111,83 @@ def write_bag(scene: AnyWritable, scene_set: 'SceneSet', out_dir: str | Path,
     :param rate: frame sets per second.
     :raises HoocError: if the bag exists already or the scene cannot be read.
     """
-    if storage not in STORAGES:
-        raise HoocError(f'storage is {storage!r}; choose one of {", ".join(STORAGES)}')
     if repeat < 1 or not 0 < rate <= 1000:
         raise HoocError(f'{repeat} frame sets at {rate} Hz cannot be written; '
                         'repeat at least once, at a rate of up to 1000 Hz')
-    path = Path(out_dir) / scene.name
+    path = _new_bag(out_dir, scene.name, storage)
+    latched = [*_latched(scene.cameras, scene_set, scene_info(scene, scene_set)), *_labels(scene)]
+    images = list(_images(scene))
+    return _written(path, storage, latched, ((i / rate, images) for i in range(repeat)))
+
+
+def write_sequence(sequence: RecordedSequence, scene_set: 'SceneSet', out_dir: str | Path,
+                   storage: str = 'mcap') -> Path:
+    """
+    Write all frame sets of a sequence as the bag out_dir/<sequence> and return its path.
+
+    Instance labels are left out: they belong to one frame set.
+
+    :param scene_set: the set of the sequence and its scenes.
+    :param storage: 'mcap' or 'sqlite3'.
+    :raises HoocError: as `write_bag`, and if the cameras are not the same in all scenes.
+    """
+    path = _new_bag(out_dir, sequence.name, storage)
+    scenes = [scene_set.scene(name) for name in sequence.scenes]
+    first = scenes[0]
+    for scene in scenes:
+        if not all(map(same_calibration, scene.cameras, first.cameras)):
+            raise HoocError(f'{scene_set.path}: the cameras of {scene.name} are not those of '
+                            f'{first.name}, and a bag holds one pose of each; take the sequence '
+                            f'{sequence.name} out of sequences.yaml to convert its scenes')
+    info = {**scene_info(first, scene_set), 'scene': sequence.name, 'truth': None, 'sequence': {
+        'period_s': sequence.period_s, 'events': sequence.events,
+        'frame_sets': [{'scene': scene.name, 'truth': _truth(scene)} for scene in scenes]}}
+    return _written(path, storage, _latched(first.cameras, scene_set, info),
+                    ((i * sequence.period_s, _images(scene)) for i, scene in enumerate(scenes)))
+
+
+def scene_info(scene: AnyWritable, scene_set: 'SceneSet') -> dict[str, Any]:
+    """Return the dict that /hooc/scene_info carries as JSON."""
+    return {'format': INFO_FORMAT, 'dataset': scene_set.name, 'scene': scene.name,
+            'world_frame': scene_set.world_frame, 'depth_unit': 0.001,
+            'cameras': [camera.name for camera in scene.cameras],
+            'categories': list(scene_set.category_names),
+            'max_instances': scene_set.max_instances, 'truth': _truth(scene), **scene.world}
+
+
+def _truth(scene: AnyWritable) -> list[dict[str, Any]] | None:
+    """Return the ground truth of a scene as plain data, None without annotation."""
+    truth = scene.truth
+    return None if truth is None else [true_object_entry(true) for true in truth]
+
+
+def _new_bag(out_dir: str | Path, name: str, storage: str) -> Path:
+    """Return the path of a bag that does not exist yet."""
+    if storage not in STORAGES:
+        raise HoocError(f'storage is {storage!r}; choose one of {", ".join(STORAGES)}')
+    path = Path(out_dir) / name
     if path.exists():
         raise HoocError(f'{path}: exists already; remove it or choose another folder')
-    messages = list(_latched(scene, scene_set)), list(_images(scene))
+    return path
+
+
+def _written(path: Path, storage: str, latched: Iterable[_Outgoing],
+             frame_sets: _FrameSets) -> Path:
+    """Write a bag and return its path; nothing is left there if that fails."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=path.parent, prefix='.') as partial:
             # The file inside is named after its folder, which therefore has its final name.
-            _write(Path(partial) / scene.name, storage, *messages, repeat, rate)
-            shutil.move(Path(partial) / scene.name, path)
+            _write(Path(partial) / path.name, storage, latched, frame_sets)
+            shutil.move(Path(partial) / path.name, path)
     except OSError as error:
         raise HoocError(f'{path}: cannot be written ({error.strerror}); '
                         'choose another place or free some space') from None
     return path
 
 
-def scene_info(scene: AnyWritable, scene_set: 'SceneSet') -> dict[str, Any]:
-    """Return the dict that /hooc/scene_info carries as JSON."""
-    truth = scene.truth
-    return {'format': INFO_FORMAT, 'dataset': scene_set.name, 'scene': scene.name,
-            'world_frame': scene_set.world_frame, 'depth_unit': 0.001,
-            'cameras': [camera.name for camera in scene.cameras],
-            'categories': list(scene_set.category_names),
-            'max_instances': scene_set.max_instances,
-            'truth': None if truth is None else [true_object_entry(true) for true in truth],
-            **scene.world}
-
-
-def _write(path: Path, storage: str, latched: Iterable[_Outgoing], images: Iterable[_Outgoing],
-           repeat: int, rate: float) -> None:
+def _write(path: Path, storage: str, latched: Iterable[_Outgoing],
+           frame_sets: _FrameSets) -> None:
     """Write all messages in the order of time."""
     with Writer(path, version=METADATA_VERSION, storage_plugin=STORAGES[storage]) as writer:
         connections = {}
@@ -154,8 +200,8 @@ def _write(path: Path, storage: str, latched: Iterable[_Outgoing], images: Itera
 
         for topic, kind, message in latched:
             write(topic, kind, message, FIRST_STAMP_NS, offered_qos(latched=True))
-        for i in range(repeat):
-            stamp_ns = FIRST_STAMP_NS + LEAD_NS + round(i * _SECOND_NS / rate)
+        for seconds, images in frame_sets:
+            stamp_ns = FIRST_STAMP_NS + LEAD_NS + round(seconds * _SECOND_NS)
             for topic, kind, message in images:
                 message.header.stamp = _time(stamp_ns)
                 write(topic, kind, message, stamp_ns, offered_qos(latched=False))
@@ -163,14 +209,19 @@ def _write(path: Path, storage: str, latched: Iterable[_Outgoing], images: Itera
         write_checksums(path / f'{path.name}.mcap')
 
 
-def _latched(scene: AnyWritable, scene_set: 'SceneSet') -> Iterator[_Outgoing]:
-    """Yield the messages on latched topics, which are sent once."""
+def _latched(cameras: Sequence[Camera], scene_set: 'SceneSet',
+             info: dict[str, Any]) -> Iterator[_Outgoing]:
+    """Yield the description and the poses of the cameras, on latched topics."""
     types = TYPES.types
-    transforms = [_transform(camera, scene_set.world_frame) for camera in scene.cameras]
-    yield INFO_TOPIC, STRING, types[STRING](json.dumps(scene_info(scene, scene_set)))
+    transforms = [_transform(camera, scene_set.world_frame) for camera in cameras]
+    yield INFO_TOPIC, STRING, types[STRING](json.dumps(info))
     yield '/tf_static', TF, types[TF](transforms)
-    for camera, transform in zip(scene.cameras, transforms):
+    for camera, transform in zip(cameras, transforms):
         yield f'{NAMESPACE}/{camera.name}/extrinsics', TRANSFORM, transform
+
+
+def _labels(scene: AnyWritable) -> Iterator[_Outgoing]:
+    """Yield the instance labels, on latched topics."""
     for camera, labels in (scene.labels() or {}).items():
         yield (f'{NAMESPACE}/{camera}/instance_labels', IMAGE,
                _image(labels.tobytes(), labels.shape, 'mono8', labels.shape[1], camera))

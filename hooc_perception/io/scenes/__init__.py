@@ -9,14 +9,15 @@ if TYPE_CHECKING:
     from hooc_perception.io.scenes.results import load_results, write_results
     from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
     from hooc_perception.io.scenes.scene_set import load_scene_set, SceneSet
+    from hooc_perception.io.scenes.sequences import RecordedSequence
     from hooc_perception.io.scenes.writer import NewScene, write_scene_set
 
-__all__ = ['Category', 'NewScene', 'RecordedScene', 'SceneSet', 'TrueObject', 'load_results',
-           'load_scene_set', 'write_results', 'write_scene_set']
+__all__ = ['Category', 'NewScene', 'RecordedScene', 'RecordedSequence', 'SceneSet', 'TrueObject',
+           'load_results', 'load_scene_set', 'write_results', 'write_scene_set']
 
 _MODULES = {'Category': 'scene', 'NewScene': 'writer', 'RecordedScene': 'scene',
-            'SceneSet': 'scene_set', 'TrueObject': 'scene', 'load_results': 'results',
-            'load_scene_set': 'scene_set', 'write_results': 'results',
+            'RecordedSequence': 'sequences', 'SceneSet': 'scene_set', 'TrueObject': 'scene',
+            'load_results': 'results', 'load_scene_set': 'scene_set', 'write_results': 'results',
             'write_scene_set': 'writer'}
 
 

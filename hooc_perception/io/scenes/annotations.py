@@ -1,7 +1,7 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Check the files of a set that only evaluation tools read: labels, strangers, sequences.
+Check the files of a scene that only evaluation tools read: labels and strangers.
 
 A mistake in them would surface as a wrong score, so they are checked with the rest of the set.
 """
@@ -14,7 +14,6 @@ from hooc_perception.io.scenes import camera_files, fields, files
 from hooc_perception.io.scenes.scene import TrueObject
 
 UNKNOWN_KEYS = ('name', 'translation', 'rotation_xyzw', 'size', 'surface_visibility', 'tag')
-SEQUENCE_KEYS = ('name', 'period_s', 'scenes', 'events')
 
 
 def check_scene(folder: Path, cameras: Sequence[str], categories: Collection[str]) -> None:
@@ -29,25 +28,6 @@ def check_scene(folder: Path, cameras: Sequence[str], categories: Collection[str
     for name, check in checks.items():
         if (folder / name).is_file():
             check(folder / name)
-
-
-def check_sequences(path: Path) -> None:
-    """Check sequences.yaml of a set, where there is one; HoocError as `check_scene`."""
-    file = path / 'sequences.yaml'
-    if not file.is_file():
-        return
-    for i, item in enumerate(files.read_yaml_list(file)):
-        where = f'{file}: [{i}]'
-        item = fields.closed(fields.mapping(item, where), SEQUENCE_KEYS, where)
-        fields.name(fields.required(item, 'name', where), f'{where} name')
-        scenes = fields.sequence(fields.required(item, 'scenes', where), f'{where} scenes')
-        for scene in scenes:
-            fields.name(scene, f'{where} scenes')
-        if 'period_s' in item and fields.number(item['period_s'], f'{where} period_s') <= 0:
-            raise HoocError(f'{where} period_s is {item["period_s"]}; give the seconds between '
-                            'two frame sets')
-        for step in fields.mapping(item.get('events', {}), f'{where} events'):
-            fields.integer(step, 0, max(0, len(scenes) - 1), f'{where} events: a key')
 
 
 def _check_labels(file: Path, categories: Collection[str]) -> None:

@@ -14,6 +14,8 @@ from hooc_perception.io.scenes import fields, files
 import numpy as np
 
 FORMAT = 'hooc-results/1'
+# Ids are unsigned 32-bit numbers in the nodes.
+LAST_ID = 2 ** 32 - 1
 _TERMS = ('total', 'depth', 'probability', 'overlap')
 
 
@@ -157,7 +159,9 @@ def _check_scene(scene: dict[str, Any], where: str) -> None:
 
 
 def _check_box(item: dict[str, Any], where: str) -> None:
-    """Check score, pose and size of one entry; `where` names file, scene and row."""
+    """Check id, score, pose and size of one entry; `where` names file, scene and row."""
+    if item.get('id') is not None:
+        fields.integer(item['id'], 0, LAST_ID, f'{where} id')
     if item.get('score') is not None:
         fields.number(item['score'], f'{where} score')
     fields.numbers(fields.required(item, 'translation', where), 3, f'{where} translation')

@@ -15,6 +15,12 @@ from hooc_perception.io.scenes.bop import is_bop, load_bop
 from hooc_perception.io.scenes.nominal_table import nominal_cameras
 from hooc_perception.io.scenes.plausible import check_aim
 from hooc_perception.io.scenes.scene import Category, RecordedScene, TrueObject
+from hooc_perception.io.scenes.sequences import (
+    load_sequences,
+    RecordedSequence,
+    scenes_named,
+    whole_sequences,
+)
 from hooc_perception.io.scenes.truth import true_object
 from hooc_perception.io.scenes.writer import FORMAT, NewScene, write_scene_set
 
@@ -28,8 +34,8 @@ MAX_MESHES = 100
 # The world_frame of sets whose poses are not in a table's frame.
 UNKNOWN_WORLD = 'unknown'
 
-__all__ = ['Category', 'NewScene', 'RecordedScene', 'SceneSet', 'TrueObject', 'load_scene_set',
-           'write_scene_set']
+__all__ = ['Category', 'NewScene', 'RecordedScene', 'RecordedSequence', 'SceneSet', 'TrueObject',
+           'load_scene_set', 'write_scene_set']
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +48,7 @@ class SceneSet:
     :ivar cameras: the set's, or those of its first scene.
     :ivar max_instances: most objects of one category in a scene, 0 = no limit.
     :ivar scenes: sorted by name; their depth is read on demand.
+    :ivar sequences: which of them are frame sets of one table over time.
     """
 
     path: Path
@@ -51,6 +58,7 @@ class SceneSet:
     cameras: tuple[Camera, ...]
     max_instances: int
     scenes: tuple[RecordedScene, ...]
+    sequences: tuple[RecordedSequence, ...] = ()
 
     @property
     def category_names(self) -> tuple[str, ...]:
@@ -66,10 +74,16 @@ class SceneSet:
         raise HoocError(f'{self.path}: there is no scene {name!r}; choose one of {known}')
 
     def selected(self, names: Iterable[str] | None) -> 'SceneSet':
-        """Return a set with these scenes only, each once, in this order (no `names`: all)."""
+        """
+        Return a set with these scenes only, each once, in this order (no `names`: all).
+
+        The name of a sequence stands for its scenes; sequences are kept if all of theirs are.
+        """
         if not names:
             return self
-        return replace(self, scenes=tuple(self.scene(name) for name in dict.fromkeys(names)))
+        names = scenes_named(names, self.sequences)
+        return replace(self, scenes=tuple(self.scene(name) for name in names),
+                       sequences=whole_sequences(self.sequences, names))
 
 
 def load_scene_set(path: str | Path, with_scenes: bool = True) -> SceneSet:
@@ -114,10 +128,10 @@ def _load_hooc(path: Path, with_scenes: bool) -> SceneSet:
     set_cameras = camera_files.load_cameras(known, posed) if known.is_file() else {}
     own = bool(set_cameras) and world != UNKNOWN_WORLD
     folders = _scene_folders(path, needed=with_scenes or not set_cameras)
-    if with_scenes:
-        annotations.check_sequences(path)
     scenes = tuple(_scene(folder, camera_names, set_cameras, unit, categories, world, path)
                    for folder in (folders if with_scenes else ()))
+    sequences = load_sequences(path, scenes, [category.name for category in categories]
+                               ) if with_scenes else ()
     if own:
         cameras = _chosen(camera_names, set_cameras, known, file)
         check_aim(cameras, known)
@@ -133,7 +147,7 @@ def _load_hooc(path: Path, with_scenes: bool) -> SceneSet:
             check_aim(cameras, folders[0] / 'cameras.yaml')
     return SceneSet(path, fields.name(entry.get('name', path.resolve().name), f'{file}: name'),
                     'table' if world == UNKNOWN_WORLD else world, categories, cameras, limit,
-                    scenes)
+                    scenes, sequences)
 
 
 def _camera_names(file: Path, entry: dict[str, Any]) -> tuple[str, ...]:

@@ -44,6 +44,15 @@ def test_there_and_back(tmp_path, parsed):
     assert [p.name for p in file.parent.iterdir()] == ['results.json']
 
 
+def test_ids_are_kept(tmp_path):
+    content = copy.deepcopy(GOOD)
+    content['scenes'][0]['objects'][0]['id'] = 7
+    content['scenes'][0]['unknown'] = [{'id': 2 ** 32 - 1, 'translation': [0, 0, 0],
+                                        'rotation_xyzw': [0, 0, 0, 1], 'size': [1, 1, 1]}]
+    write_results(tmp_path / 'r.json', 'kitchen', content['scenes'])
+    assert load_results(tmp_path / 'r.json') == content
+
+
 def test_an_empty_scene_is_a_result(tmp_path, parsed):
     nothing = ParsedScene(Candidates.empty(), parsed.energy, *([np.zeros(0)] * 4),
                           Candidates.empty())
@@ -72,6 +81,8 @@ ERRORS = [
     (lambda r, s, o: o.pop('category'), ('10_1', 'objects[0]', 'category')),
     *((lambda r, s, o, bad=bad: o.update(member=bad), ('10_1', 'objects[0]', 'member', str(bad)))
       for bad in (-1, 1.5, 'first', 10 ** 6)),
+    *((lambda r, s, o, bad=bad: o.update(id=bad), ('10_1', 'objects[0]', 'id', str(bad)))
+      for bad in (-1, 1.5, 'first', True, 2 ** 32)),
     (lambda r, s, o: o.update(score='good'), ('10_1', 'objects[0]', 'score', 'good')),
     (lambda r, s, o: o.update(translation=[0, 0]), ('10_1', 'objects[0]', 'translation')),
     (lambda r, s, o: o.update(rotation_xyzw=[0, 0, 0, 0]), ('10_1', 'rotation_xyzw', 'unit')),

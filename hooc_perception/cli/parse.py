@@ -32,6 +32,9 @@ def add_arguments(parser: ArgumentParser) -> None:
                         help='setting B: the true poses are among the candidates')
     parser.add_argument('--sigmas', action='store_true',
                         help='also estimate the uncertainty of each pose')
+    parser.add_argument('--incremental', action='store_true',
+                        help='each frame set of a sequence follows the one before, as in the '
+                        'nodes; objects have lasting ids (a set without sequences is one)')
     options.add_executor(parser)
 
 
@@ -39,6 +42,7 @@ def run(args: Namespace) -> int | None:
     """Parse every scene, write the results of those that could be; return the exit code."""
     from hooc_perception.cli.categories import category_gap, warn_of_gap
     from hooc_perception.cli.failures import tell_failures
+    from hooc_perception.cli.incremental import updates
     from hooc_perception.cli.overrides import overrides_of
     from hooc_perception.cli.places import file_place
     from hooc_perception.cli.sources import load_source, provenance
@@ -57,7 +61,11 @@ def run(args: Namespace) -> int | None:
     parser = Parser.load(folder, args.profile, parameters=overrides_of(args.set_parameter),
                          max_instances=scene_set.max_instances, sigmas=args.sigmas)
     seed = folder.seed if args.seed is None else args.seed
-    scenes = scene_set.selected(args.scene).scenes
+    selected = scene_set.selected(args.scene)
+    scenes = selected.scenes
+    if args.incremental and (args.true_poses or args.executor != 'local'):
+        raise HoocError('--incremental parses one frame set after the other; leave out '
+                        + ('--true-poses' if args.true_poses else '--executor'))
     if args.true_poses:
         _check_true_poses(scenes, names, category_gap(names, scene_set.category_names, args.set))
     else:
@@ -67,8 +75,9 @@ def run(args: Namespace) -> int | None:
     failures: dict[str, HoocError] = {}
     with executor(args.executor):
         # One scene at a time on the cores at hand, which the stages share out between them.
-        done = spread(_parsed, repeat(parser), repeat(seed),
-                      (_read(s, args.true_poses) for s in scenes))
+        read = (_read(s, args.true_poses) for s in scenes)
+        done = (updates(parser, seed, scenes, read, selected.sequences) if args.incremental
+                else spread(_parsed, repeat(parser), repeat(seed), read))
         progress = tqdm(total=len(scenes), desc='parsing', unit='scene', disable=None)
         for scene, (parsed, seconds) in zip(scenes, done):
             progress.update()

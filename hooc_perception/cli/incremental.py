@@ -1,0 +1,65 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""`hooc parse --incremental`: the frame sets of a sequence, each after the one before."""
+
+from collections.abc import Iterable, Iterator, Sequence
+import time
+from typing import Any, TYPE_CHECKING
+
+from hooc_perception.core.arrays import UInt32Array
+from hooc_perception.errors import HoocError
+from hooc_perception.scene import Scene
+
+if TYPE_CHECKING:
+    from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.io.scenes.scene import RecordedScene
+    from hooc_perception.io.scenes.sequences import RecordedSequence
+    from hooc_perception.parser import Parser
+
+# Where nothing says how far apart frame sets are.
+PERIOD_S = 0.1
+
+
+def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagScene]',
+            read: Iterable[Any], sequences: 'Sequence[RecordedSequence]',
+            ) -> Iterator[tuple[Any, float]]:
+    """
+    Yield, for each scene in order, (dict of the Scene with ids, seconds) or (HoocError, NaN).
+
+    A frame set that cannot be parsed is left out of its sequence. Scenes that no sequence names
+    are one sequence.
+
+    :param read: per scene (DepthViews, anything), or the HoocError that reading gave.
+    """
+    from hooc_perception.core.parsing.tracking import Tracker
+    of_scene = {name: sequence for sequence in sequences for name in sequence.scenes}
+    tracker, current, number = Tracker(parser.models), None, 0
+    previous: Scene | None = None
+    for scene, given in zip(scenes, read):
+        sequence = of_scene.get(scene.name)
+        if number == 0 or sequence is not current:
+            tracker, previous, current, number = Tracker(parser.models), None, sequence, 0
+        stamp_ns = round(number * (PERIOD_S if sequence is None else sequence.period_s) * 1e9)
+        number += 1
+        if isinstance(given, HoocError):
+            yield given, float('nan')
+            continue
+        start = time.monotonic()
+        try:
+            result = parser.update(given[0], previous, seed)
+        except HoocError as error:
+            yield error, float('nan')
+            continue
+        previous, seconds = result, time.monotonic() - start
+        ids, _ = tracker.update(stamp_ns, result.parsed.objects)
+        unknown_ids = tracker.update_unknown(stamp_ns, result.parsed.unknown)
+        yield _with_ids(result.to_dict(), ids, unknown_ids), seconds
+
+
+def _with_ids(entry: dict[str, Any], ids: UInt32Array, unknown_ids: UInt32Array,
+              ) -> dict[str, Any]:
+    """Return a scene of a results file with the ids of its objects."""
+    for key, numbers in (('objects', ids), ('unknown', unknown_ids)):
+        for thing, number in zip(entry.get(key, ()), numbers.tolist()):
+            thing['id'] = number
+    return entry

@@ -71,6 +71,7 @@ TOPICS = {
     'objects/unknown': Topic(1, True, PARSING),
     'objects/unknown_attributes': Topic(1, True, PARSING),
     'objects/detections': Topic(1, True, PARSING),
+    'objects/events': Topic(10, True, PARSING),
     'scene/table': Topic(1, True, INGESTION),
     'scene/unexplained': Topic(1, True, PARSING),
     'scene/summary': Topic(1, True, PARSING),

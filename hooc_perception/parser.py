@@ -13,11 +13,11 @@ from os import fspath, PathLike
 import time
 from typing import Any, TYPE_CHECKING, TypeVar
 
-from hooc_perception.core.arrays import AnyArray, BoolArray
+from hooc_perception.core.arrays import AnyArray
 from hooc_perception.core.classification.classify import classify, KIND_PAPER
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import inverse, stage_rng
-from hooc_perception.core.incremental.memory import next_step, Past, Step
+from hooc_perception.core.incremental.memory import Memory, next_step, Past, Step
 from hooc_perception.core.incremental.watch import watch
 from hooc_perception.core.parsing.uncertainty import pose_uncertainty
 from hooc_perception.core.parsing.verifier import Verifier
@@ -134,28 +134,45 @@ class Parser:
         watched = lap('observe', watch(rectified, None if past is None else past.watched, config,
                                        table.T_target_table))
         observation = require_table(watched.observation)
-        step = next_step(None if past is None else past.memory, observation,
-                         config.accumulate.full_share, self.method.settle_frames)
-        if past is None or step.full:
-            parsed = self._whole(observation, lap, seed)
-        elif step.region is None and not full:
-            parsed = replace(past.parsed, seconds={})
-        else:
-            parsed = self._revised(observation, past, step, lap, seed, full)
+        step = self.step(None if past is None else past.memory, observation)
+
+        def frame() -> Frame:
+            return self.frame(observation, lap('classify', self.classify(observation)))
+
+        parsed = self.follow(step, None if past is None else past.parsed, frame,
+                             lambda seen: lap('propose', self.propose(seen, seed)), seed, full)
         return replace(self._scene(parsed, observation, lap),
                        past=Past(watched, table, step.memory, parsed))
 
-    def _revised(self, observation: Observation, past: Past, step: Step, lap: '_Laps', seed: int,
-                 full: bool) -> ParsedScene:
-        """Return the ParsedScene of an observation that follows others, in the table frame."""
-        frame = self.frame(observation, lap('classify', self.classify(observation)))
-        region, extra = step.region, Candidates.empty()
+    def step(self, memory: Memory | None, observation: Observation) -> Step:
+        """Return what a frame set asks for beside the one before, see `next_step`."""
+        return next_step(memory, observation, self.profile.observe.accumulate.full_share,
+                         self.method.settle_frames)
+
+    def follow(self, step: Step, before: ParsedScene | None, frame: Callable[[], Frame],
+               pool: Callable[[Frame], Candidates], seed: int = 0, full: bool = False,
+               ) -> ParsedScene:
+        """
+        Stage 4 of a frame set that follows another one, in the table frame.
+
+        :param step: of this frame set.
+        :param before: the answer to the frame set before; None = there is none.
+        :param frame: returns the Frame; not called where nothing has changed.
+        :param pool: returns the candidates of stage 3 for it; called for a full parse only.
+        :param full: decide everything anew where nothing has changed, too; what is not clearly
+            better does not replace the answer.
+        """
+        if before is None or step.full:
+            seen = frame()
+            return self.decide(seen, pool(seen), seed)
+        if step.region is None and not full:
+            return replace(before, seconds={})
+        seen, extra, region = frame(), Candidates.empty(), step.region
         if full:
-            region = tuple(view.foreground for view in observation.views)
-            extra = lap('propose', self.propose(frame, seed))
+            region, extra = tuple(v.foreground for v in seen.observation.views), pool(seen)
         assert region is not None
-        return self.revise(frame, past.parsed, region, seed,
-                           settled=full or step.settled, extra=extra)
+        return self._finished(seen, self.method.revise(
+            seen, before, region, seed, self.max_instances, full or step.settled, extra), seed)
 
     def _whole(self, observation: Observation, lap: '_Laps', seed: int,
                change_pool: Callable[[Candidates], Candidates] | None = None) -> ParsedScene:
@@ -200,22 +217,6 @@ class Parser:
         """Stage 4: the subset of candidates that explains the frame, with scores and sigmas."""
         return self._finished(frame, self.method.parse(frame, pool, seed, self.max_instances),
                               seed)
-
-    def revise(self, frame: Frame, before: ParsedScene, region: Sequence[BoolArray],
-               seed: int = 0, settled: bool = False,
-               extra: Candidates = Candidates.empty()) -> ParsedScene:
-        """
-        Stages 3 and 4 of a frame set that follows others.
-
-        :param before: the answer to the last one, in the table frame.
-        :param region: per view (H, W) bool, what is decided anew, see `next_step`.
-        :param settled: the region stands still: only what is better by `revise_gain` replaces
-            anything.
-        :param extra: further candidates.
-        """
-        parsed = self.method.revise(frame, before, region, seed, self.max_instances, settled,
-                                    extra)
-        return self._finished(frame, parsed, seed)
 
     def _finished(self, frame: Frame, parsed: ParsedScene, seed: int) -> ParsedScene:
         """Return a ParsedScene with the sigmas that it lacks, calibrated scores and the rest."""

@@ -21,7 +21,7 @@ from hooc_perception.core.methods.paper import PaperMethod, PaperParseConfig
 from hooc_perception.core.methods.protocol import Method
 from hooc_perception.core.parsing.config import ParseConfig
 from hooc_perception.core.parsing.verifier import Verifier
-from hooc_perception.core.segment.config import ObserveConfig
+from hooc_perception.core.segment.config import AccumulateConfig, ObserveConfig
 from hooc_perception.errors import HoocError
 
 
@@ -68,7 +68,8 @@ def profile(name: str) -> Profile:
     if name == 'best':
         return Profile()
     if name == 'paper':
-        return Profile('paper', observe=ObserveConfig(uneven_m=0.0, min_foreground_m=0.005),
+        return Profile('paper', observe=ObserveConfig(uneven_m=0.0, min_foreground_m=0.005,
+                                                      accumulate=AccumulateConfig(1)),
                        propose=FragmentConfig(), parse=PaperParseConfig())
     if name == 'fast':
         return Profile('fast', classify=ClassifyConfig(stride=3),

@@ -10,7 +10,8 @@ from typing import Any
 from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import CANDIDATES
 from hooc_perception.core.frame.frame import Frame
-from hooc_perception.core.types import Observation
+from hooc_perception.core.incremental.memory import Memory
+from hooc_perception.core.types import Candidates, Observation
 from hooc_perception.nodes.model import camera_names, model_of, node_profile, parser_of
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.inputs.view_input import ViewInput
@@ -48,6 +49,7 @@ class Proposal:
         self._parser = parser_of(node, model)
         warmed(node, model, lambda observation, probabilities, _, models: self._parser.propose(
             Frame(observation, probabilities, models), node.config.seed))
+        self._memory: Memory | None = None
         self._poses = node.publisher(PoseArray, 'candidates/poses')
         self._attributes = node.publisher(PointCloud2, 'candidates/attributes')
         self.input = ViewInput(node, camera_names(node, model), 'propose',
@@ -60,8 +62,10 @@ class Proposal:
         probabilities = probabilities_from_message(messages['probabilities'], observation,
                                                    len(self.models))
         self._parser = self._parser.changed(node_profile(self._node, self._model))
-        candidates = self._parser.propose(self._parser.frame(observation, probabilities),
-                                          self._node.config.seed)
+        candidates = Candidates.empty()
+        if self._is_asked(observation):
+            candidates = self._parser.propose(self._parser.frame(observation, probabilities),
+                                              self._node.config.seed)
         poses, attributes = candidates_messages(
             candidates.moved(observation.T_target_table),
             header(stamp_ns, self._node.config.target_frame))
@@ -69,6 +73,20 @@ class Proposal:
         self._poses.publish(poses)
         self._node.diagnostics.ok('propose', seconds=time.monotonic() - start,
                                   candidates=len(candidates))
+
+    def _is_asked(self, observation: Observation) -> bool:
+        """
+        Return whether candidates are proposed for the whole scene.
+
+        Where only a part has changed, or nothing, parsing proposes for what its objects leave
+        unexplained there.
+        """
+        if not self._node.config.incremental:
+            self._memory = None
+            return True
+        step = self._parser.step(self._memory, observation)
+        self._memory = step.memory
+        return step.full
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -9,8 +9,10 @@ from typing import Any
 
 from hooc_perception.chain import CLASSIFICATION
 from hooc_perception.core.classification.classify import KIND_PAPER
+from hooc_perception.core.incremental.carry import carried
+from hooc_perception.core.incremental.memory import Memory
 from hooc_perception.core.segment.checks import rig_size_trouble, rig_trouble
-from hooc_perception.core.types import Observation
+from hooc_perception.core.types import Observation, PixelProbabilities
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.model import camera_names, model_of, node_profile, parser_of
 from hooc_perception.nodes.warm_up import warmed
@@ -51,6 +53,9 @@ class Classification:
             raise HoocError(trouble)
         self._parser = parser_of(node, model)
         warmed(node, model, lambda observation, *_: self._parser.classify(observation))
+        # Of the last frame set; None: the next one is classified in any case.
+        self._memory: Memory | None = None
+        self._last: PixelProbabilities | None = None
         self._probabilities = node.publisher(PointCloud2, 'pixels/probabilities')
         self._labels = [
             node.publisher(Image, 'pixels/<camera>/labels', f'pixels/{name}/labels')
@@ -63,7 +68,7 @@ class Classification:
         start, diagnostics = time.monotonic(), self._node.diagnostics
         self._check_rig(observation)
         self._parser = self._parser.changed(node_profile(self._node, self._model))
-        probabilities = self._parser.classify(observation)
+        probabilities = self._classified(observation)
         self._probabilities.publish(probabilities_message(
             probabilities, observation.in_target_frame(), self._classes,
             header(stamp_ns, self._node.config.target_frame)))
@@ -72,6 +77,20 @@ class Classification:
         for name, publisher, image in zip(self._names, self._labels, images):
             publisher.publish(labels_message(image, header(stamp_ns, messages['frames'][name])))
         diagnostics.ok('classify', seconds=seconds, pixels=len(probabilities.camera))
+
+    def _classified(self, observation: Observation) -> PixelProbabilities:
+        """Return the probabilities: those of the last frame set where nothing has changed."""
+        if not self._node.config.incremental:
+            self._memory = self._last = None
+            return self._parser.classify(observation)
+        step = self._parser.step(self._memory, observation)
+        still = not step.full and step.region is None
+        if still and self._last is not None:
+            self._last = carried(self._last, observation)
+        else:
+            self._last = self._parser.classify(observation)
+        self._memory = step.memory
+        return self._last
 
     def _check_rig(self, observation: Observation) -> None:
         """Report cameras that do not stand where a view-bound classifier was trained."""

@@ -11,6 +11,7 @@ from typing import Any
 from geometry_msgs.msg import TransformStamped
 from hooc_perception.chain import INGESTION
 from hooc_perception.core.extrinsics.residual import pair_residuals
+from hooc_perception.core.incremental.watch import watch, Watched
 from hooc_perception.core.segment.checks import table_trouble
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.observe import observe
@@ -22,7 +23,7 @@ from hooc_perception.core.segment.table import (
     Table,
     TableTracker,
 )
-from hooc_perception.core.types import DepthView, RectifiedView
+from hooc_perception.core.types import DepthView, Observation, RectifiedView
 from hooc_perception.errors import HoocError
 from hooc_perception.io.frame_sets import FrameSet
 from hooc_perception.nodes.assembly import Assembly
@@ -105,6 +106,8 @@ class Ingestion:
             flat = DepthView(overhead_camera(), np.ones((120, 160), np.float32))
             pair_residuals(observe([rectify(flat, node.observe_config)] * 2,
                                    node.observe_config))
+        # What earlier frame sets have shown; None = nothing.
+        self._watched: Watched | None = None
         self.number = 0            # of sets that were sent
         self.output = ViewOutput(node, self._names)
         self._table, self._table_output = TableTracker(), TableOutput(node)
@@ -132,7 +135,7 @@ class Ingestion:
         """Begin to listen; what was heard before does not count."""
         self.assembly.sets.clear()
         self.pace.forget()
-        self._held = None
+        self._held = self._watched = None
         for camera in self.inputs:
             camera.begin()
 
@@ -142,6 +145,7 @@ class Ingestion:
         reason = self.assembly.add(name, image, info, transform,
                                    self._node.observe_config)
         if reason == 'time_jump':
+            self._watched = None
             self.pace.forget()
             self._tf.clear()
         self._send_if_complete()
@@ -191,7 +195,7 @@ class Ingestion:
             views, counts = self.assembly.views(frame_set, node.observe_config)
             code = 'refused'
             table = self._table.update(views, node.observe_config)
-            observation = observe(views, node.observe_config, table.T_target_table)
+            observation = self._observed(views, table)
             self.robot.check(observation)
         except HoocError as error:
             thing, code = (('robot', error.code) if isinstance(error, StateUnknown)
@@ -213,6 +217,15 @@ class Ingestion:
             seconds=time.monotonic() - start)
         self._report_table(table, views, frame_set, head)
         self._rig_health.check(observation)
+
+    def _observed(self, views: Sequence[RectifiedView], table: Table) -> Observation:
+        """Return the observation of a frame set, with the readings of those before it."""
+        config, T = self._node.observe_config, table.T_target_table
+        if not self._node.config.incremental:
+            self._watched = None
+            return observe(views, config, T)
+        self._watched = watch(views, self._watched, config, T)
+        return self._watched.observation
 
     def _report_table(self, table: Table, views: Sequence[RectifiedView],
                       frame_set: FrameSet[RawFrame], head: Header) -> None:

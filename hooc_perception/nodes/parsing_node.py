@@ -14,6 +14,7 @@ from hooc_perception.chain import PARSING
 from hooc_perception.core.config import param
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import inverse
+from hooc_perception.core.parsing.events import EventLog
 from hooc_perception.core.parsing.hidden_objects import HiddenObjects
 from hooc_perception.core.parsing.tracking import TrackConfig, Tracker
 from hooc_perception.core.parsing.unexplained import unexplained_points
@@ -24,6 +25,7 @@ from hooc_perception.core.types import (
     ParsedScene,
     PixelProbabilities,
 )
+from hooc_perception.nodes.following import FollowConfig, Following
 from hooc_perception.nodes.model import (
     camera_names,
     mesh_uris,
@@ -49,13 +51,14 @@ from hooc_perception.ros.outputs.adapters.choose import (
 )
 from hooc_perception.ros.outputs.detect_service import DetectService
 from hooc_perception.ros.outputs.detected import detected_scene
+from hooc_perception.ros.outputs.event_output import EventOutput
 from hooc_perception.ros.outputs.object_output import ObjectOutput
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import SetBool, Trigger
 
 
 @dataclass(frozen=True)
-class ParsingConfig(AdapterConfig, TrackConfig, StageConfig):
+class ParsingConfig(FollowConfig, AdapterConfig, TrackConfig, StageConfig):
     """Parameters of the parsing node."""
 
     max_instances: int = param(-1, 'Maximum number of objects per category in a scene; 0 = no '
@@ -117,8 +120,10 @@ class Parsing:
                                  node.config.sigmas)
         warmed(node, model, self._try_out)
         self._tracker = Tracker(model.models, node.config)
+        self._following, self._log = Following(), EventLog(model.models)
         self._hidden = HiddenObjects(model.models, node.config, self._parser.max_instances)
         self.output = ObjectOutput(node, model.models, mesh_uris(model))
+        self._events = EventOutput(node)
         self.input = ViewInput(node, camera_names(node, model), 'parse', {
             'probabilities': (PointCloud2, 'pixels/probabilities'),
             'poses': (PoseArray, 'candidates/poses'),
@@ -141,17 +146,28 @@ class Parsing:
 
     def _parsed(self, observation: Observation, messages: dict[str, Any]) -> ParsedScene:
         """Return the ParsedScene, in the target frame, of what came together for one stamp."""
-        n = len(self.models)
+        n, config = len(self.models), self._node.config
         probabilities = probabilities_from_message(messages['probabilities'], observation, n)
         pool = candidates_from_messages(messages['poses'], messages['attributes'],
                                         [len(model.members) for model in self.models])
-        self._parser = self._parser.changed(node_profile(self._node, self._model),
-                                            self._node.config.sigmas)
+        parser = self._parser = self._parser.changed(node_profile(self._node, self._model),
+                                                     config.sigmas)
         T = observation.T_target_table
-        parsed = self._parser.decide(self._parser.frame(observation, probabilities),
-                                     pool if T is None else pool.moved(inverse(T)),
-                                     self._node.config.seed)
-        return parsed.moved(T)
+        pool = pool if T is None else pool.moved(inverse(T))
+
+        def frame() -> Frame:
+            return parser.frame(observation, probabilities)
+
+        def candidates(seen: Frame) -> Candidates:
+            # Stage 3 leaves out what it does not take to have changed.
+            return pool if len(pool) else parser.propose(seen, config.seed)
+
+        if not config.incremental:
+            self._following.forget()
+            return parser.decide(frame(), pool, config.seed).moved(T)
+        return self._following.update(
+            parser, observation, frame, candidates, config.seed, config.full_every_s,
+            config.detect_full and self._node.detect.is_waited_for).moved(T)
 
     def on_set(self, stamp_ns: int, observation: Observation, messages: dict[str, Any]) -> None:
         """Parse one frame set and publish the result."""
@@ -165,10 +181,12 @@ class Parsing:
         found = len(ids)
         parsed, ids = self._hidden.update(stamp_ns, parsed, ids, observation)
         self._tracker.hold(ids, stamp_ns)
+        events = self._log.update(ids, parsed.objects, parsed.hidden_s)
         scene = detected_scene(parsed, ids, self.models, stamp_ns, frame,
                                self._tracker.update_unknown(stamp_ns, parsed.unknown))
         age_s = (node.now_ns() - stamp_ns) * 1e-9
         self.output.publish(parsed, scene, age_s, left)
+        self._events.publish(stamp_ns, events)
         self._answered = time.monotonic()
         publish_all(node, self.adapters, scene)
         node.detect.answer(scene)
@@ -180,6 +198,7 @@ class Parsing:
         """Publish that nothing is known any more; objects that return in time keep their ids."""
         self._answered = None
         self._hidden.forget()
+        self._log.forget()
         now = self._node.now_ns(), self._node.config.target_frame
         self.output.clear(*now)
         clear_all(self._node, self.adapters, *now)
@@ -202,6 +221,7 @@ class Parsing:
                   response: Trigger.Response) -> Trigger.Response:
         """Forget what waits to be joined and what was seen; retract the last result."""
         self.input.clear()
+        self._following.forget()
         self._tracker.forget()
         self._hidden.forget()
         if self._node.active:

@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""Objects that the robot hides stay in the results, as they were last seen."""
+"""Objects that the robot or an arm hides stay in the results, as they were last seen."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,6 +14,8 @@ import numpy as np
 
 # An object is hidden if the robot covers at least this share of its pixels, over all views, ...
 HIDDEN_SHARE = 0.25
+# ... of an object that is still found, since nothing that is seen speaks against it, this share, ...
+COVERED_SHARE = 0.75
 # ... and the rest shows no more than this share of readings behind it: else it is gone.
 THROUGH_SHARE, THROUGH_PX = 0.25, 10
 # A reading is behind the object if it is farther than its surface by more than this.
@@ -55,14 +57,30 @@ class HiddenObjects:
             self.forget()
         seen_ns = np.full(len(ids), stamp_ns, np.int64)
         if self._last is not None and any(view.hidden is not None for view in observation.views):
+            seen_ns = self._last_seen(stamp_ns, parsed, ids, observation.views)
+            lasting = stamp_ns - seen_ns <= self.config.keep_hidden_s * 1e9
+            parsed, ids, seen_ns = parsed.take(lasting), ids[lasting], seen_ns[lasting]
             kept = self._kept(stamp_ns, parsed, ids, observation.views)
             if kept:
                 parsed = _joined(parsed, self._last, kept)
                 ids = np.concatenate([ids, self._ids[kept]])
                 seen_ns = np.concatenate([seen_ns, self._seen_ns[kept]])
+            if (seen_ns < stamp_ns).any():
                 parsed = replace(parsed, hidden_s=((stamp_ns - seen_ns) * 1e-9).astype(np.float32))
         self._last, self._ids, self._seen_ns, self._stamp_ns = parsed, ids, seen_ns, stamp_ns
         return parsed, ids
+
+    def _last_seen(self, stamp_ns: int, parsed: ParsedScene, ids: UInt32Array,
+                   views: Sequence[ObservedView]) -> Int64Array:
+        """Return (n,) int64 ns, when each found object was last seen: now, unless it is hidden."""
+        seen_ns, objects = np.full(len(ids), stamp_ns, np.int64), parsed.objects
+        for k, model in enumerate(objects.shapes(self.models)):
+            before = np.flatnonzero(self._ids == ids[k])
+            vertices = posed_vertices(model, objects.translation[k], objects.rotation_xyzw[k],
+                                      objects.size[k])
+            if len(before) and _is_hidden(vertices, model, views, COVERED_SHARE):
+                seen_ns[k] = self._seen_ns[before[0]]
+        return seen_ns
 
     def _kept(self, stamp_ns: int, parsed: ParsedScene, ids: UInt32Array,
               views: Sequence[ObservedView]) -> list[int]:
@@ -92,8 +110,9 @@ def _is_taken(translation: AnyArray, size: AnyArray, parsed: ParsedScene) -> boo
     return bool((apart < 0.5 * longest).any())
 
 
-def _is_hidden(vertices: AnyArray, model: GenericModel, views: Sequence[ObservedView]) -> bool:
-    """Return whether the robot hides a posed mesh, and nobody sees through its place."""
+def _is_hidden(vertices: AnyArray, model: GenericModel, views: Sequence[ObservedView],
+               share: float = HIDDEN_SHARE) -> bool:
+    """Return whether a share of a posed mesh is hidden, and nobody sees through its place."""
     total = hidden = through = 0
     for view in views:
         pixels, depth = render_patch(vertices, model.faces, view.camera)
@@ -103,7 +122,7 @@ def _is_hidden(vertices: AnyArray, model: GenericModel, views: Sequence[Observed
         # No reading compares as false.
         through += int((view.depth.ravel()[pixels] > depth + THROUGH_M).sum())
     gone = through >= THROUGH_PX and through > THROUGH_SHARE * (total - hidden)
-    return hidden > 0 and hidden >= HIDDEN_SHARE * total and not gone
+    return hidden > 0 and hidden >= share * total and not gone
 
 
 def _joined(parsed: ParsedScene, last: ParsedScene, rows: list[int]) -> ParsedScene:

@@ -35,5 +35,8 @@ class StageConfig(NodeConfig):
     target_frame: str = param('table', 'Frame of all results: z up, z = 0 is the table top.')
     seed: int = param(0, 'Seed of all random choices; every stage derives its own from it.',
                       '', 0, 2 ** 31 - 1)
+    incremental: bool = param(
+        True, 'What has not changed since the last frame set is not decided anew (docs/live.md). '
+        'Give all nodes the same value; false = every frame set by itself.', runtime=True)
     warm_up: bool = param(True, 'Run the stage on a synthetic scene while configuring, so that '
                           'the first result does not wait for compiled code.')

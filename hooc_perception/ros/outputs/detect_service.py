@@ -56,6 +56,11 @@ class DetectService:
                             callback_group=ReentrantCallbackGroup())
         node.create_timer(0.2, self._give_up, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
+    @property
+    def is_waited_for(self) -> bool:
+        """Return whether somebody waits for an answer."""
+        return bool(self._waiting)
+
     async def _on_call(self, request: Trigger.Request,
                        response: Trigger.Response) -> Trigger.Response:
         reason = self._refusal() if self._node.active else 'the node is not active: activate it'

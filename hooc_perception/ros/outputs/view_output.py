@@ -57,7 +57,7 @@ class ViewOutput:
             outputs['extrinsics'].publish(transform_message(
                 *pose_from_matrix(view.camera.T_world_camera), head, frame))
             outputs['segments'].publish(segments_message(seen, own))
-            outputs['depth_rect'].publish(depth_message(view.depth, own))
+            outputs['depth_rect'].publish(depth_message(seen.depth, own))
         self._poses.publish(poses_message(observation, head))
         # Ten megabytes per set: only if somebody listens.
         if self._points.get_subscription_count():

@@ -4,6 +4,7 @@
 
 from argparse import ArgumentParser, Namespace
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
 import os
 from pathlib import Path
 import platform
@@ -14,6 +15,7 @@ from hooc_perception.errors import HoocError
 
 if TYPE_CHECKING:
     from hooc_perception.benchmark.chain import ChainTimes
+    from hooc_perception.benchmark.live import LiveTime
     from hooc_perception.benchmark.measure import Contest, Entry
     from hooc_perception.benchmark.scene import BenchScene
 
@@ -40,6 +42,7 @@ def run(args: Namespace) -> None:
     """Hold the contests, print and write what they show."""
     from hooc_perception.benchmark import parsing
     from hooc_perception.benchmark.chain import chain_times
+    from hooc_perception.benchmark.live import live_times
     from hooc_perception.benchmark.measure import hold
     from hooc_perception.benchmark.scene import bench_scene
     from hooc_perception.cli.places import file_place
@@ -56,10 +59,13 @@ def run(args: Namespace) -> None:
     quality = parsing.search_quality(scene, args.seed) if SEARCH in chosen else {}
     _print(entries, quality)
     times = chain_times(folder, scene) if folder else None
+    live = live_times(folder, scene, args.seed) if folder else []
     if times:
         _print_chain(times)
+        _print_live(live)
     if args.json:
-        write_json(args.json, _content(entries, quality, times, args.seed))
+        write_json(args.json, {**_content(entries, quality, times, args.seed),
+                               'live': [asdict(time) for time in live]})
         print(args.json)
 
 
@@ -109,6 +115,16 @@ def _print(entries: Sequence['Entry'], quality: Mapping[str, float]) -> None:
             f'{name} {value:.4f}' for name, value in quality.items()) + '.')
     print(to_text(Table('Stages beside baselines', ('', 'ms', 'ratio', 'MB'), tuple(rows),
                         tuple(notes))))
+
+
+def _print_live(times: Sequence['LiveTime']) -> None:
+    """Print the times of incremental parsing beside those of a parse."""
+    from hooc_perception.evaluation.tables import Table, to_text
+    rows = tuple((t.what, f'{t.seconds:.3f}', f'{t.slowest:.3f}', f'{t.ratio:.3g} x')
+                 for t in times)
+    print('\n' + to_text(Table(
+        'Frame sets that follow others', ('frame set', 's', 'slowest', 'ratio'), rows,
+        ('', 's: median wall time. ratio: speed-up over a parse of each frame set by itself.'))))
 
 
 def _print_chain(times: 'ChainTimes') -> None:

@@ -1,0 +1,84 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""Incremental parsing beside a parse of each frame set, on the bench scene."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from time import perf_counter as now
+
+from hooc_perception.benchmark.scene import BenchScene
+from hooc_perception.core.geometry import stage_rng
+from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import DepthView
+from hooc_perception.parser import Parser
+from hooc_perception.scene import Scene
+from hooc_perception.trained.folder import ModelFolder
+import numpy as np
+
+# Frame sets without change; objects that are taken and put back.
+STILL, CHANGES = 8, 4
+# Noise of the readings from one frame set to the next, in metres at 1 m: a Kinect v2's.
+NOISE_M = 0.0015
+
+
+@dataclass(frozen=True)
+class LiveTime:
+    """
+    Seconds per frame set.
+
+    :ivar what: the kind of frame set.
+    :ivar seconds: median; `slowest` the longest of them.
+    :ivar ratio: how many times faster than a parse of the frame set by itself.
+    """
+
+    what: str
+    seconds: float
+    slowest: float
+    ratio: float
+
+
+def live_times(folder: ModelFolder, scene: BenchScene, seed: int = 0) -> list[LiveTime]:
+    """Return the times of frame sets that show no change, an object taken, an object put."""
+    parser, rng = Parser.load(folder, max_instances=0, sigmas=False), stage_rng(seed, 'bench/live')
+    nothing: set[int] = set()
+
+    def update(gone: set[int], previous: Scene | None) -> tuple[Scene, float]:
+        views = _views(scene, gone, rng)
+        return _timed(lambda: parser.update(views, previous, folder.seed))
+
+    _, whole = zip(*(_timed(lambda: parser.parse(_views(scene, nothing, rng), folder.seed))
+                     for _ in range(3)))
+    last, _ = update(nothing, None)
+    still, taken, put = [], [], []
+    for _ in range(STILL):
+        last, seconds = update(nothing, last)
+        still.append(seconds)
+    for k in range(CHANGES):
+        for gone, times in (({k}, taken), (nothing, put)):
+            last, seconds = update(gone, last)
+            times.append(seconds)
+    alone = float(np.median(whole[1:]))
+    return [LiveTime(what, float(np.median(times)), max(times), alone / float(np.median(times)))
+            for what, times in (('every frame set by itself', whole[1:]), ('no change', still),
+                                ('an object taken', taken), ('an object put', put))]
+
+
+def _timed(work: Callable[[], Scene]) -> tuple[Scene, float]:
+    start = now()
+    result = work()
+    return result, now() - start
+
+
+def _views(scene: BenchScene, gone: set[int], rng: np.random.Generator) -> Sequence[DepthView]:
+    """Return raw views of the scene without some of its objects, with new noise."""
+    views = []
+    left = [mesh for k, mesh in enumerate(scene.meshes) if k not in gone]
+    for view, seen in zip(scene.views, scene.observation.views):
+        depth = view.depth.copy()
+        _, owner = render_depth(scene.meshes, view.camera)
+        behind, _ = render_depth(left, view.camera)
+        pixels = np.isin(owner, list(gone))
+        depth[pixels] = np.fmin(behind, seen.background)[pixels]
+        depth += rng.normal(0, NOISE_M, depth.shape).astype(np.float32) * depth ** 2
+        views.append(DepthView(view.camera, depth.astype(np.float32)))
+    return views

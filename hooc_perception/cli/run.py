@@ -172,8 +172,10 @@ def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
     # A recorded frame set is complete, however long it waits.
     parameters[INGESTION].update(max_frame_age_s=0.0,
                                  wait_for_answer_s=min(args.timeout, LONGEST_WAIT_S))
-    # Each bag is a scene of its own: nothing is tracked from the last one.
+    # Each bag is a scene of its own: nothing is tracked or taken over from the last one.
     parameters[PARSING].update(track_ttl_s=0.0)
+    for node in CHAIN:
+        parameters[node].update(incremental=False)
     parameters[REPLAY] = {'match_timeout_s': MATCH_TIMEOUT_S}
     with Supervisor((*CHAIN, REPLAY), parameters, isolated=True, verbose=args.verbose,
                     params_file=args.params, defaults=model_defaults(model)) as supervisor:

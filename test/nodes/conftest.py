@@ -7,6 +7,7 @@ import time
 
 from hooc_perception.core.geometry import pose_from_matrix
 from hooc_perception.core.methods.joint import JointMethod
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import Energy, ParsedScene
 from hooc_perception.nodes.warm_up import made_up_scene, overhead_camera
 from hooc_perception.objects.derive import derive
@@ -163,7 +164,8 @@ def make_chain(bench, folder, monkeypatch):
     Return a function that brings up the four nodes with Stages instead of the real ones.
 
     It takes the names of the cameras and {node: parameters}, puts the active nodes into
-    `bench.chain` and returns (stages, function that sends images of one stamp).
+    `bench.chain` and returns (stages, function that sends images of one stamp). Each frame set is
+    decided by itself unless `incremental` says otherwise: the images are always the same.
     """
     from geometry_msgs.msg import TransformStamped
     from hooc_perception.nodes import (
@@ -183,8 +185,9 @@ def make_chain(bench, folder, monkeypatch):
         cameras = {name: replace(overhead_camera(), name=name) for name in names}
         stages = Stages(made_up_scene(folder.models, tuple(cameras.values())))
         stages.install(monkeypatch)
-        common = {'model': str(folder.path), 'cameras': list(names), 'seed': 5, 'warm_up': False}
-        bench.chain = [bench.add(kind, **common, **(parameters or {}).get(i, {}))
+        common = {'model': str(folder.path), 'cameras': list(names), 'seed': 5, 'warm_up': False,
+                  'incremental': False}
+        bench.chain = [bench.add(kind, **{**common, **(parameters or {}).get(i, {})})
                        for i, kind in enumerate(kinds)]
         peer, topics = bench.peer, {}
         for name in names:
@@ -207,13 +210,14 @@ def make_chain(bench, folder, monkeypatch):
                                   f'/hooc/views/{name}/depth_rect') == 3)
         bench.rest(0.3)
 
-        def send(shift_s=0.0, only=names, stamp=None):
+        def send(shift_s=0.0, only=names, stamp=None, empty=False):
             stamp = stamp or peer.get_clock().now().nanoseconds + int(shift_s * 1e9)
             for name in only:
                 head = c.header(stamp, f'{name}_optical')
                 topics[name][0].publish(c.camera_info_message(cameras[name], head))
-                topics[name][1].publish(c.depth_message(
-                    stages.views[names.index(name)].depth, head))
+                view = stages.views[names.index(name)]
+                depth = observe([view]).views[0].background if empty else view.depth
+                topics[name][1].publish(c.depth_message(depth, head))
             return stamp
         return stages, send
     return make

@@ -165,7 +165,7 @@ def test_images_that_cannot_be_meant_are_refused_and_the_next_is_used(bench, fla
 
 
 def test_resolution_and_encoding_may_change_between_frames(bench):
-    node, (raw,), heard = start(bench, 'a', fuse_frames=3)
+    node, (raw,), heard = start(bench, 'a', fuse_frames=3, incremental=False)
     standing(bench, [raw])
     raw.send(S)
     assert bench.spin(lambda: len(heard['a']) == 1)
@@ -310,7 +310,7 @@ def test_recorded_stamps_without_their_clock_are_explained(bench):
 
 
 def test_fusion_is_the_median_of_the_last_frames(bench):
-    node, (raw,), heard = start(bench, 'a', fuse_frames=3)
+    node, (raw,), heard = start(bench, 'a', fuse_frames=3, incremental=False)
     raw.camera = replace(raw.camera, D=np.zeros(5))
     standing(bench, [raw])
     counts = bench.hear(Image, 'views/a/count', qos('views/<camera>/count'))

@@ -3,11 +3,13 @@
 
 HOOC := .venv/bin/hooc
 PYTEST_ARGS ?=
-# Of `make results`: which sets (SHAPES, OSD and DEV are folders), which rows (none named: all, of
-# SHAPES best and fast), what to keep or to force.
+# Of `make results`: which sets (SHAPES, HOTS, GLASSWARE, OSD and DEV are folders), which rows (none
+# named: all, of SHAPES, HOTS and GLASSWARE best and fast), what to keep or to force.
 RESULTS ?= results
 SETS ?= twin
 SHAPES ?=
+HOTS ?=
+GLASSWARE ?=
 OSD ?=
 DEV ?=
 ROWS ?=
@@ -21,8 +23,8 @@ help:
 	@echo 'make demo    set up if need be, then find the objects of the bundled scene'
 	@echo 'make test    set up if need be, then run every test (PYTEST_ARGS="-k name" for some)'
 	@echo 'make setup   only set up'
-	@echo 'make results recompute the tables of docs/results.md: SHAPES=folder OSD=folder DEV=folder for'
-	@echo '             more sets, SETS= to leave out the twin,'
+	@echo 'make results recompute the tables of docs/results.md: SHAPES=folder HOTS=folder'
+	@echo '             GLASSWARE=folder OSD=folder DEV=folder for more sets, SETS= to leave out the twin,'
 	@echo '             ROWS="best fast ablations", KEEP="paper fpfh ppf", FORCE="best", RESULTS=folder,'
 	@echo '             JOBS=1'
 	@echo 'make bundle  make the bundled scene and model again'
@@ -41,7 +43,8 @@ test: setup
 
 results: setup
 	@.venv/bin/python -m hooc_perception.experiments --out $(RESULTS) \
-	  $(addprefix --set ,$(if $(SHAPES),shapes=$(SHAPES)) $(if $(OSD),osd=$(OSD)) \
+	  $(addprefix --set ,$(if $(SHAPES),shapes=$(SHAPES)) $(if $(HOTS),hots=$(HOTS)) \
+	    $(if $(GLASSWARE),glassware=$(GLASSWARE)) $(if $(OSD),osd=$(OSD)) \
 	    $(if $(DEV),dev=$(DEV)) $(SETS)) \
 	  $(if $(ROWS),--rows $(ROWS)) $(if $(KEEP),--keep $(KEEP)) $(if $(FORCE),--force $(FORCE)) --jobs $(JOBS)
 

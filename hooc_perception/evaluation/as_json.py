@@ -51,6 +51,8 @@ def as_json(scene_set: SceneSet, evaluations: Sequence[Evaluation],
             entry['open_world'] = open_world.summary(e.open_world)
         if e.masks:
             entry['masks'] = [asdict(m) for m in e.masks]
+        if e.named:
+            entry['named'] = e.named
         if e.bop:
             entry['bop'] = asdict(e.bop) | {'average': e.bop.average}
         results.append(entry)

@@ -24,7 +24,9 @@ ROWS = SCORED + (ABLATIONS,)
 # Profiles that have a verifier.
 VERIFIED = ('best', 'fast')
 # Of a set that is not listed here, all rows are made where none are asked for.
-ROWS_OF = {'shapes': ('best', 'fast')}
+ROWS_OF = {'shapes': ('best', 'fast'), 'hots': ('best', 'fast'), 'glassware': ('best', 'fast')}
+# Further options of `hooc train` for a set. Things of no category stand on the tables of hots.
+TRAIN_OF = {'hots': ('--strangers',)}
 
 # Modules whose code, with all that they import, a kind of step runs.
 _SETS = 'hooc_perception.io.scenes.scene_set'
@@ -154,7 +156,7 @@ class _SetPlan:
         path, model, answers = self.path, self.layout.model(row), [self.layout.results(row, 'A')]
         out = [self._step(row, 'train', 'train',
                           ['train', path, '--profile', row, '--seed', self.seed, '--jobs',
-                           self.jobs], [], model)]
+                           self.jobs, *TRAIN_OF.get(self.layout.name, ())], [], model)]
         parse = ['parse', path, '--model', model, '--profile', row, '--seed', self.seed]
         out.append(self._step(row, 'A', 'parse', parse, [model], answers[0]))
         if not self.posed:

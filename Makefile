@@ -3,11 +3,14 @@
 
 HOOC := .venv/bin/hooc
 PYTEST_ARGS ?=
-# Of `make results`: which sets (SHAPES, OSD, MOVES and DEV are folders), which rows (none named: all,
-# of SHAPES best and fast, of MOVES best and incremental), what to keep or to force.
+# Of `make results`: which sets (SHAPES, HOTS, GLASSWARE, OSD, MOVES and DEV are folders), which rows
+# (none named: all, of SHAPES, HOTS and GLASSWARE best and fast, of MOVES best and incremental), what to
+# keep or to force.
 RESULTS ?= results
 SETS ?= twin
 SHAPES ?=
+HOTS ?=
+GLASSWARE ?=
 OSD ?=
 MOVES ?=
 DEV ?=
@@ -22,8 +25,8 @@ help:
 	@echo 'make demo    set up if need be, then find the objects of the bundled scene'
 	@echo 'make test    set up if need be, then run every test (PYTEST_ARGS="-k name" for some)'
 	@echo 'make setup   only set up'
-	@echo 'make results recompute the tables of docs/results.md: SHAPES=folder OSD=folder MOVES=folder'
-	@echo '             DEV=folder for more sets, SETS= to leave out the twin,'
+	@echo 'make results recompute the tables of docs/results.md: SHAPES=folder HOTS=folder GLASSWARE=folder'
+	@echo '             OSD=folder MOVES=folder DEV=folder for more sets, SETS= to leave out the twin,'
 	@echo '             ROWS="best fast ablations", KEEP="paper fpfh ppf", FORCE="best", RESULTS=folder,'
 	@echo '             JOBS=1'
 	@echo 'make bundle  make the bundled scene and model again'
@@ -42,7 +45,8 @@ test: setup
 
 results: setup
 	@.venv/bin/python -m hooc_perception.experiments --out $(RESULTS) \
-	  $(addprefix --set ,$(if $(SHAPES),shapes=$(SHAPES)) $(if $(OSD),osd=$(OSD)) \
+	  $(addprefix --set ,$(if $(SHAPES),shapes=$(SHAPES)) $(if $(HOTS),hots=$(HOTS)) \
+	    $(if $(GLASSWARE),glassware=$(GLASSWARE)) $(if $(OSD),osd=$(OSD)) \
 	    $(if $(MOVES),moves=$(MOVES)) $(if $(DEV),dev=$(DEV)) $(SETS)) \
 	  $(if $(ROWS),--rows $(ROWS)) $(if $(KEEP),--keep $(KEEP)) $(if $(FORCE),--force $(FORCE)) --jobs $(JOBS)
 

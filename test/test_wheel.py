@@ -119,6 +119,7 @@ def test_the_bundled_scene_is_parsed_and_reported(prefix):
     assert run.returncode == 0, run.stdout + run.stderr
     page = (prefix / 'out/report.html').read_text()
     assert page.rstrip().endswith('</html>') and scene['objects'][0]['category'] in page
+    assert 'three.js authors' in page and 'OrbitControls' in page
 
 
 @pytest.mark.parametrize('words, extra', [

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
 HELP = ("Score results against the ground truth of a scene set: the paper's Tables 1-4 and "
         'stricter scores (centre within 2 cm, rotation up to symmetry, size and surface, '
-        'certain but wrong estimates, calibration of the scores). Scenes with instance '
-        'labels but no poses are scored by masks. Several results files are shown side by side; '
-        'without results, Table 1 is printed in full.')
+        'certain but wrong estimates, calibration of the scores). Scenes with instance labels but '
+        'no poses are scored by masks, and by category where labels.yaml has it. Several results '
+        'files are shown side by side; without results, Table 1 is printed in full.')
 MOVED = {
     '--stages': 'hooc stages SET --model MODEL',
     '--executor': 'hooc stages SET --model MODEL --executor WHERE',
@@ -110,7 +110,13 @@ def _tables(evaluations: Sequence['Evaluation'], scene_set: 'SceneSet',
             visibility: dict[str, list['Visibility']],
             truth_energy: dict[str, 'Energy']) -> list['Table']:
     """Return every table that there are figures for."""
-    from hooc_perception.evaluation import certainty, open_world, paper_tables, sequences
+    from hooc_perception.evaluation import (
+        certainty,
+        named_masks,
+        open_world,
+        paper_tables,
+        sequences,
+    )
     from hooc_perception.evaluation.shape_table import shape_table
 
     tables: list[Table | None] = [
@@ -128,6 +134,9 @@ def _tables(evaluations: Sequence['Evaluation'], scene_set: 'SceneSet',
             tables += [paper_tables.category_table(e, scene_set.category_names),
                        certainty.score_table(e), certainty.sigma_table(e)]
         tables.append(paper_tables.mask_table(e))
+    named = {e.label: e.named for e in evaluations if e.named}
+    tables += [named_masks.named_table(named),
+               *(named_masks.mistakes_table(label, s) for label, s in named.items())]
     return [table for table in tables if table]
 
 

@@ -53,6 +53,8 @@ def as_json(scene_set: SceneSet, evaluations: Sequence[Evaluation],
             entry['sequences'] = sequences.summary(e.sequences)
         if e.masks:
             entry['masks'] = [asdict(m) for m in e.masks]
+        if e.named:
+            entry['named'] = e.named
         if e.bop:
             entry['bop'] = asdict(e.bop) | {'average': e.bop.average}
         results.append(entry)

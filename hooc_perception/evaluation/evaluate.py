@@ -12,8 +12,9 @@ from hooc_perception.core.segment.rectify import rectified_numbers, rectify
 from hooc_perception.core.types import GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.bop import bop_score, BopScene, BopScore
-from hooc_perception.evaluation.masks import MaskScore, score_masks
+from hooc_perception.evaluation.masks import Labels, MaskScore, score_masks
 from hooc_perception.evaluation.matching import in_frame_of, posed, PosedObject
+from hooc_perception.evaluation.named_masks import summary
 from hooc_perception.evaluation.open_world import open_score, OpenScore
 from hooc_perception.evaluation.scores import per_category, SceneScore, score_scene
 from hooc_perception.evaluation.sequences import Frame, sequence_score, SequenceScore
@@ -57,6 +58,11 @@ class Evaluation:
     shapes: dict[str, list[ShapeError]] = field(default_factory=dict)
     open_world: tuple[OpenScore, ...] = ()
     sequences: tuple[SequenceScore, ...] = ()
+
+    @property
+    def named(self) -> dict[str, Any] | None:
+        """Return `named_masks.summary` of the scenes whose labels have categories."""
+        return summary([m.named for m in self.masks if m.named])
 
     def per_category(self, categories: Iterable[str]) -> dict[str, dict[str, Any]]:
         """Return `scores.per_category` of all scenes with poses."""
@@ -168,7 +174,8 @@ def _masks(scene: RecordedScene, found: list[PosedObject], models: Mapping[str, 
            about: dict[str, Any]) -> MaskScore:
     """Return the MaskScore of a scene with instance labels."""
     raw = {view.camera.name: view for view in scene.depth()}
-    labels = {name: rectified_numbers(image, raw[name].camera)
-              for name, image in (scene.labels() or {}).items()}
+    labels = Labels({name: rectified_numbers(image, raw[name].camera)
+                     for name, image in (scene.labels() or {}).items()},
+                    scene.label_categories, scene.well_seen)
     views = [rectify(view, RECTIFY) for view in raw.values()]
     return score_masks(scene.name, found, models, views, labels, **about)

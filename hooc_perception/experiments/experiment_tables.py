@@ -5,7 +5,7 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from hooc_perception.evaluation import paper, shape_table
+from hooc_perception.evaluation import named_masks, paper, shape_table
 from hooc_perception.evaluation.tables import Cell, Table
 from hooc_perception.experiments import ablations
 from hooc_perception.experiments.detail_tables import HOOC, of_setting, Scores
@@ -14,8 +14,8 @@ import numpy as np
 
 # Settings in the order of the tables, and what these call them.
 SETTINGS = {'A': 'A', 'B': 'B', ablations.UNVERIFIED: 'B, no verifier'}
-# Sets in the order of the tables, those of objects unlike the generic models first.
-SETS = ('shapes', 'osd', 'moves', 'dev', 'twin')
+# Sets in the order of the tables: objects unlike the generic models first, then real depth.
+SETS = ('shapes', 'hots', 'glassware', 'osd', 'moves', 'dev', 'twin')
 
 
 def summary_of(name: str, posed: dict[str, Scores], masked: dict[str, Scores],
@@ -35,7 +35,7 @@ def summary_of(name: str, posed: dict[str, Scores], masked: dict[str, Scores],
         out = [score_table(posed, seconds), certain_table(posed),
                *([stage_table(stages)] if stages else []), category_table(posed, stages)]
     if masked:
-        out.append(mask_table(masked, seconds))
+        out += [mask_table(masked, seconds), *named_tables(masked)]
     return out
 
 
@@ -184,6 +184,14 @@ def mask_table(scores: dict[str, Scores], seconds: Mapping[str, float | None]) -
                                      'CPU s'), tuple(rows),
                  ('A labelled object is explained by a mask of IoU >= .5, one to one. CPU s: '
                   'processor seconds per scene.',))
+
+
+def named_tables(scores: dict[str, Scores]) -> list[Table]:
+    """Return the scores by category of labelled objects; [] where categories are not known."""
+    known = {f'`{row}`': content['results'][0]['named'] for row, content in scores.items()
+             if 'named' in content['results'][0]}
+    table = named_masks.named_table(known)
+    return [table, *(named_masks.mistakes_table(*item) for item in known.items())] if table else []
 
 
 def step_table(records: Mapping[str, Record]) -> Table:

@@ -25,7 +25,10 @@ INCREMENTAL = 'incremental'
 # Profiles that have a verifier.
 VERIFIED = ('best', 'fast')
 # Of a set that is not listed here, all of ROWS are made where none are asked for.
-ROWS_OF = {'shapes': ('best', 'fast'), 'moves': ('best', INCREMENTAL)}
+ROWS_OF = {'shapes': ('best', 'fast'), 'hots': ('best', 'fast'), 'glassware': ('best', 'fast'),
+           'moves': ('best', INCREMENTAL)}
+# Further options of `hooc train` for a set. Things of no category stand on the tables of hots.
+TRAIN_OF = {'hots': ('--strangers',)}
 
 # Modules whose code, with all that they import, a kind of step runs.
 _SETS = 'hooc_perception.io.scenes.scene_set'
@@ -160,7 +163,7 @@ class _SetPlan:
         path, model, answers = self.path, self.layout.model(row), [self.layout.results(row, 'A')]
         out = [self._step(row, 'train', 'train',
                           ['train', path, '--profile', row, '--seed', self.seed, '--jobs',
-                           self.jobs], [], model)]
+                           self.jobs, *TRAIN_OF.get(self.layout.name, ())], [], model)]
         parse = self._parse(row)
         out.append(self._step(row, 'A', 'parse', parse, [model], answers[0]))
         if self.moving or not self.posed:

@@ -8,7 +8,7 @@ import shutil
 from hooc_perception.cli.main import main as hooc
 from hooc_perception.core.profiles import profile
 from hooc_perception.errors import HoocError
-from hooc_perception.experiments import fingerprint, page, plan, run
+from hooc_perception.experiments import experiment_tables, fingerprint, page, plan, run
 from hooc_perception.experiments.__main__ import main
 from hooc_perception.experiments.ablations import SWITCHES
 import pytest
@@ -82,6 +82,31 @@ def test_the_page_of_a_set_with_sequences_shows_how_they_went(tmp_path, moving, 
     assert [row[:4] for row in cells(text, '`best`') + cells(text, '`incremental`')] == [
         ['best', '1.000', '0.00', '1/1'], ['incremental', '0.500', '0.00', '0/1']]
     assert cells(text, 's 0: placed can') == [['s 0: placed can', '0', 'never']]
+
+
+def test_hots_is_trained_among_strangers(tmp_path, scene_set):
+    steps = {s.name: s for s in plan.steps_of({'hots': scene_set, 'glassware': scene_set},
+                                              tmp_path)}
+    rows = {name.rpartition('/')[0] for name in steps if name.endswith('/train')}
+    assert rows == {f'{name}/{row}' for name in ('hots', 'glassware') for row in ('best', 'fast')}
+    assert [name for name, s in steps.items() if '--strangers' in s.arguments] == [
+        'hots/best/train', 'hots/fast/train']
+
+
+def test_labels_with_categories_have_tables_of_their_own():
+    named = {'well_seen': {'labelled': 4, 'explained': 0.75, 'named': 0.5},
+             'all': {'labelled': 8, 'explained': 0.5, 'named': 0.25}, 'scenes': 2, 'false': 1.5,
+             'shown': 5.0, 'categories': {'cup': {'labelled': 4, 'named': 2}},
+             'taken_for': [{'category': 'cup', 'taken_for': 'can', 'count': 1}],
+             'false_categories': {'can': 3}}
+    masks = [{'name': 'a', 'explained': 4, 'labelled': 8, 'estimated': 5, 'iou': [0.5]}]
+    scores = {'best': {'results': [{'setting': 'A', 'masks': masks, 'named': named}]},
+              'fast': {'results': [{'setting': 'A', 'masks': masks}]}}
+    tables = experiment_tables.summary_of('hots', {}, scores, {}, {})
+    assert [t.title for t in tables] == ['Explained masks', 'Named objects',
+                                         'Named by category: `best`']
+    assert tables[1].rows == (('`best`', 4, '0.750', '0.500', 8, '0.500', '0.250', 1.5, '5.0'),)
+    assert tables[2].rows == (('cup', 4, 2, 0.5, 0, 'can 1'), ('can', 0, 0, None, 3, None))
 
 
 def test_setting_b_without_the_verifier_is_b_with_one_parameter_changed(tmp_path, scene_set):
@@ -298,10 +323,11 @@ def test_the_pages_of_the_documentation_have_the_markers():
     names = set()
     for path in docs.glob('results*.md'):
         names |= page.inserted(path.read_text(), {}, str(path))[1]
-    assert names >= {f'{name}{what}' for name in ('shapes', 'osd', 'dev', 'twin')
+    assert names >= {f'{name}{what}'
+                     for name in ('shapes', 'hots', 'glassware', 'osd', 'dev', 'twin')
                      for what in ('', ' details', ' ablations')} | {
                          'moves', 'steps', 'twin worst', 'dev worst', 'shapes worst',
-                         'shapes pictures'}
+                         'shapes pictures', 'glassware worst', 'glassware pictures'}
 
 
 def test_the_command_says_what_is_wrong(tmp_path, capsys):

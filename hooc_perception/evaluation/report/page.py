@@ -10,7 +10,7 @@ from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.pictures import Palette
 from hooc_perception.evaluation.report.rows import missed_rows, object_rows, rejected_rows
 from hooc_perception.evaluation.report.scene import ReportScene, ShownScene, UNKNOWN
-from hooc_perception.evaluation.report.space import Meshes, space_json
+from hooc_perception.evaluation.report.space import Meshes, Space
 from hooc_perception.evaluation.report.views import shaded_pictures, view_pictures
 from hooc_perception.io.scenes.files import write_atomically
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -33,8 +33,8 @@ def report_html(scenes: Sequence[ReportScene], title: str = 'Objects on the tabl
     """
     Return the page.
 
-    It is self-contained: pictures are PNGs inside the page, the 3D view is drawn by a script
-    inside the page, and nothing is requested from elsewhere.
+    It is self-contained: pictures are PNGs inside the page, three.js inside the page draws the
+    3D view, and nothing is requested from elsewhere.
 
     :param notes: sentences below the title, such as the profile and the name of the model.
     """
@@ -44,11 +44,16 @@ def report_html(scenes: Sequence[ReportScene], title: str = 'Objects on the tabl
     environment.filters['pretty'] = lambda name: str(name).replace('_', ' ')
     meshes = Meshes()
     shown = [_scene(index, scene, palette, meshes) for index, scene in enumerate(scenes)]
-    script = (Path(__file__).parent / 'space.js').read_text(encoding='utf-8')
     return environment.get_template('page.html.j2').render(
         title=title, notes=list(notes), scenes=shown, mean=_mean(shown),
-        meshes=Markup(meshes.json()), script=Markup(script),
+        meshes=Markup(meshes.json()), viewer=Markup(_text('three/three.min.js')),
+        licence=Markup(_text('three/LICENSE')), script=Markup(_text('space.js')),
         residual_cm=round(pictures.RESIDUAL_M * 100))
+
+
+def _text(name: str) -> str:
+    """Return a file of this folder."""
+    return (Path(__file__).parent / name).read_text(encoding='utf-8')
 
 
 def write_report(path: str | Path, scenes: Sequence[ReportScene],
@@ -64,6 +69,7 @@ def write_report(path: str | Path, scenes: Sequence[ReportScene],
 def _scene(index: int, scene: ReportScene, palette: Palette, store: Meshes) -> dict[str, Any]:
     """Return what the template shows of one scene."""
     shown = ShownScene.of(scene)
+    space = Space.of(shown, palette)
     scores, rows = scene.scores or [], object_rows(scene, palette)
     return {
         'id': f's{index}', 'name': scene.name, 'energy': _energy(scene),
@@ -77,7 +83,7 @@ def _scene(index: int, scene: ReportScene, palette: Palette, store: Meshes) -> d
         'false': len({o.category for o in scene.objects}
                      - {t.category for t in scene.truth}) if scene.truth is not None else None,
         'rejected': rejected_rows(scene, palette), 'candidates': len(scene.pool),
-        'space': Markup(space_json(shown, rows, palette, store)),
+        'space': Markup(space.json(rows, store)), 'still': pictures.data_uri(space.still()),
         'shaded': shaded_pictures(shown, palette)}
 
 

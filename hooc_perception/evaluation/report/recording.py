@@ -13,14 +13,13 @@ from hooc_perception.errors import HoocError
 from hooc_perception.evaluation.errors import world_mesh
 from hooc_perception.evaluation.matching import PosedObject, shape_of
 from hooc_perception.evaluation.report import pictures
+from hooc_perception.evaluation.report.cloud import extent_of, KINDS, seen_points
 from hooc_perception.evaluation.report.page import palette_of
 from hooc_perception.evaluation.report.scene import ReportScene, ShownScene
-from hooc_perception.evaluation.report.space import extent_of, seen_points
 from hooc_perception.io.scenes.files import atomic_file
 import numpy as np
 
 TIMELINE = 'scene'
-GROUPS = ('table', 'explained', 'unexplained')
 POINT_RADIUS_M = 0.0012
 
 
@@ -92,10 +91,13 @@ def _log_scene(rr: Any, recording: Any, scene: ReportScene, palette: pictures.Pa
         facts = {key: value for key, value in known.items() if value is not None}
         recording.log(place, rr.AnyValues(score=scene.objects[i].score, **facts))
     groups = seen_points(scene.observation, meshes, [colours[i] for i in drawn])
-    low, high = extent_of(groups[1][0], groups[2][0], meshes)
-    for name, (points, rgb) in zip(GROUPS, groups):
+    low, high = extent_of(groups, meshes)
+    for kind in KINDS:
+        mine = [group for group in groups if group.kind == kind]
+        points, rgb = (np.concatenate([getattr(group, part) for group in mine])
+                       for part in ('points', 'rgb'))
         near = ((points >= low) & (points <= high)).all(1)
-        recording.log(f'world/points/{name}', rr.Points3D(
+        recording.log(f'world/points/{kind}', rr.Points3D(
             points[near], colors=rgb[near].clip(0, 255).astype(np.uint8), radii=POINT_RADIUS_M))
     for i, thing in enumerate(scene.truth or ()):
         if thing.category in scene.models:

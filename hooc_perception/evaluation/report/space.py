@@ -1,28 +1,32 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The data of the 3D view: measured points, posed models, unexplained points."""
+"""The 3D view: its data (points, posed models, cameras, table) and a still picture of it."""
 
 import base64
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 import json
 from typing import Any
 
-from hooc_perception.core.arrays import AnyArray, Float64Array
-from hooc_perception.core.geometry import back_project
+from hooc_perception.core.arrays import AnyArray, Float64Array, UInt8Array
+from hooc_perception.core.geometry import inverse, project, transform
 from hooc_perception.core.render import render_depth
-from hooc_perception.core.types import GenericModel, Observation
+from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.evaluation.errors import affine
 from hooc_perception.evaluation.matching import member_of, PosedObject, shape_of
 from hooc_perception.evaluation.report import pictures
+from hooc_perception.evaluation.report.cloud import extent_of, PointGroup, seen_points, thinned
 from hooc_perception.evaluation.report.pictures import Palette, RGB
-from hooc_perception.evaluation.report.scene import ShownScene
+from hooc_perception.evaluation.report.scene import ShownScene, UNKNOWN
+from hooc_perception.evaluation.report.viewpoint import azimuth_beside, Viewpoint, viewpoint
+from hooc_perception.objects.shaded import render_shaded
 import numpy as np
 
-# As core.parsing.unexplained: a pixel within this distance of the composed objects is explained.
-EXPLAINED_M = 0.02
-MAX_FOREGROUND, MAX_TABLE = 24000, 12000
-BORDER_M = 0.12
-TABLE_RGB, UNEXPLAINED_RGB = (150, 154, 160), (255, 60, 60)
+# Length of a drawn camera, in its distances from the middle of the scene.
+FRUSTUM = 0.15
+STILL_SIZE = (800, 450)
+# A point this far behind a surface still lies on it.
+ON_SURFACE_M = 0.01
 
 
 class Meshes:
@@ -59,26 +63,110 @@ def script_json(content: Any) -> str:
     return json.dumps(content, allow_nan=False).replace('<', '\\u003c')
 
 
-def space_json(shown: ShownScene, rows: Sequence[Mapping[str, Any]], palette: Palette,
-               store: Meshes) -> str:
+@dataclass(frozen=True)
+class Space:
     """
-    Return the JSON of the 3D view of one scene.
+    What the 3D view of one scene shows.
 
-    :param rows: rows of the objects' table, for the details of an object that is clicked.
-    :param store: the meshes of the page.
+    :ivar colours: (r, g, b) of every drawn object.
+    :ivar groups: the points in the box (`low`, `high`), thinned.
+    :ivar view: where the viewer stands at first.
     """
-    models, observation = shown.scene.models, shown.scene.observation
-    colours = pictures.instance_colours(shown.drawn, palette)
-    facts = {row['k']: facts_of(row) for row in rows}
-    objects = [{'name': o.category, 'colour': [int(c) for c in colours[k]],
-                'facts': facts.get(k, [])} | placed(o, models, store)
-               for k, o in enumerate(shown.drawn)]
-    truth = [{'name': o.category} | placed(o, models, store) for o in shown.true]
-    cloud, target = cloud_of(observation, shown.meshes, colours)
-    eye = observation.views[0].camera.T_world_camera[:3, 3] - target
-    return script_json({'objects': objects, 'truth': truth, 'cloud': cloud,
-                        'target': [float(x) for x in target],
-                        'azimuth': float(np.arctan2(eye[1], eye[0]))})
+
+    shown: ShownScene
+    colours: list[RGB]
+    groups: list[PointGroup]
+    low: Float64Array
+    high: Float64Array
+    view: Viewpoint
+
+    @staticmethod
+    def of(shown: ShownScene, palette: Palette) -> 'Space':
+        """Return the 3D view of a scene."""
+        observation = shown.scene.observation
+        colours = pictures.instance_colours(shown.drawn, palette)
+        groups = seen_points(observation, shown.meshes, colours)
+        low, high = extent_of(groups, shown.meshes)
+        groups = thinned(groups, low, high)
+        cameras = [view.camera for view in observation.views]
+        middle = (low + high) / 2
+        table = [(x, y, 0.0) for x in (low[0], high[0]) for y in (low[1], high[1])]
+        view = viewpoint(
+            np.concatenate([table, *(g.points for g in groups), *(v for v, _ in shown.meshes)]),
+            azimuth_beside(cameras[0], middle),
+            np.concatenate([*(frustum(c, middle) for c in cameras),
+                            *(v for v, _ in shown.true_meshes)]))
+        return Space(shown, colours, groups, low, high, view)
+
+    def json(self, rows: Sequence[Mapping[str, Any]], store: Meshes) -> str:
+        """
+        Return the view as JSON for a script element.
+
+        :param rows: rows of the objects' table, for the details of an object that is clicked.
+        :param store: the meshes of the page.
+        """
+        models, facts = self.shown.scene.models, {row['k']: facts_of(row) for row in rows}
+        objects = [{'name': o.category, 'colour': [int(c) for c in self.colours[k]],
+                    'unknown': o.category == UNKNOWN,
+                    'facts': facts.get(k, [])} | placed(o, models, store)
+                   for k, o in enumerate(self.shown.drawn)]
+        middle = (self.low + self.high) / 2
+        return script_json({
+            'objects': objects, 'cloud': self._cloud(),
+            'truth': [{'name': o.category} | placed(o, models, store) for o in self.shown.true],
+            'cameras': [{'name': v.camera.name, 'frustum': frustum(v.camera, middle).tolist()}
+                        for v in self.shown.scene.observation.views],
+            # Results are in a frame whose z = 0 is the table top.
+            'table': {'low': self.low[:2].tolist(), 'high': self.high[:2].tolist(), 'z': 0.0},
+            'view': {'eye': self.view.eye.tolist(), 'target': self.view.target.tolist(),
+                     'field': self.view.field_deg, 'near': self.view.near, 'far': self.view.far,
+                     'nearest': self.view.nearest, 'farthest': self.view.farthest}})
+
+    def _cloud(self) -> dict[str, Any]:
+        """Return the points, packed, in the order of the groups."""
+        points = np.concatenate([g.points for g in self.groups])
+        rgb = np.concatenate([g.rgb for g in self.groups])
+        span = self.high - self.low
+        return {'groups': [{'camera': g.camera, 'kind': g.kind, 'n': len(g.points)}
+                           for g in self.groups],
+                'low': self.low.tolist(), 'span': span.tolist(),
+                'p': packed(np.round(65535 * (points - self.low) / span), np.uint16),
+                'rgb': packed(rgb.clip(0, 255), np.uint8)}
+
+    def still(self) -> UInt8Array:
+        """Return (h, w, 3) uint8: the first view, for browsers and prints without 3D."""
+        camera = self.view.camera(STILL_SIZE)
+        rgb = render_shaded(self.shown.meshes, camera, colours=self.colours,
+                            background=pictures.NOTHING).copy()
+        surface = render_depth(self.shown.meshes, camera)[0]
+        points = np.concatenate([g.points for g in self.groups])
+        colours = np.concatenate([g.rgb for g in self.groups]).clip(0, 255)
+        local = transform(inverse(camera.T_world_camera), points)
+        u, v = (np.round(x).astype(int) for x in project(camera.K, local))
+        # Two by two pixels each.
+        x, y = (np.concatenate([u, u + 1, u, u + 1]), np.concatenate([v, v, v + 1, v + 1]))
+        z, colours = np.tile(local[:, 2], 4), np.tile(colours, (4, 1))
+        seen = (x >= 0) & (x < camera.width) & (y >= 0) & (y < camera.height)
+        seen[seen] = z[seen] <= surface[y[seen], x[seen]] + ON_SURFACE_M
+        # Far points first: near ones are drawn over them.
+        order = np.flatnonzero(seen)[np.argsort(-z[seen], kind='stable')]
+        rgb[y[order], x[order]] = colours[order]
+        return rgb
+
+
+def frustum(camera: Camera, middle: AnyArray) -> Float64Array:
+    """
+    Return (5, 3) world metres: a camera's centre and four points on the rays of its corners.
+
+    The corners come in the order of a walk around the image, from its upper left.
+    """
+    width, height = camera.width, camera.height
+    corners = np.array([[-0.5, -0.5, 1], [width - 0.5, -0.5, 1],
+                        [width - 0.5, height - 0.5, 1], [-0.5, height - 0.5, 1]])
+    centre = camera.T_world_camera[:3, 3]
+    length = FRUSTUM * float(np.linalg.norm(centre - np.asarray(middle)))
+    rays = corners @ np.linalg.inv(camera.K).T * length
+    return transform(camera.T_world_camera, np.concatenate([np.zeros((1, 3)), rays]))
 
 
 def placed(thing: PosedObject, models: Mapping[str, GenericModel],
@@ -88,62 +176,6 @@ def placed(thing: PosedObject, models: Mapping[str, GenericModel],
     A, t = affine(thing, model)
     return {'mesh': store.use(model, member_of(thing, models)),
             'at': [float(x) for x in (*A.T.ravel(), *t)]}
-
-
-def seen_points(observation: Observation, meshes: Sequence[tuple[AnyArray, AnyArray]],
-                colours: Sequence[RGB]) -> list[tuple[Float64Array, Float64Array]]:
-    """
-    Return [(points (n, 3) world, rgb (n, 3) float 0-255)] of three groups of readings.
-
-    They are the table, points that an object explains (in its colour), and unexplained points.
-
-    :param meshes: posed objects, see `world_mesh`; `colours` one (r, g, b) each.
-    """
-    groups: list[list[tuple[Float64Array, Float64Array]]] = [[], [], []]
-    for view in observation.views:
-        points = back_project(view.depth, view.camera)
-        depth, ids = render_depth(meshes, view.camera)
-        with np.errstate(invalid='ignore'):
-            explained = view.foreground & (np.abs(depth - view.depth) <= EXPLAINED_M)
-        shade = 0.55 + 0.45 * pictures.hillshade(view.depth, view.camera)
-        for k, mask in enumerate((view.table & ~view.foreground & np.isfinite(view.depth),
-                                  explained, view.foreground & ~explained)):
-            rgb = np.full((mask.sum(), 3), TABLE_RGB, float)
-            if k == 1:
-                rgb = np.array([*colours, (0, 0, 0)], float)[ids[mask]]
-            elif k == 2:
-                rgb[:] = UNEXPLAINED_RGB
-            groups[k].append((points[mask], rgb * shade[mask][:, None]))
-    return [(np.concatenate([points for points, _ in group]),
-             np.concatenate([rgb for _, rgb in group])) for group in groups]
-
-
-def extent_of(explained: Float64Array, left: Float64Array,
-              meshes: Sequence[tuple[AnyArray, AnyArray]]) -> Float64Array:
-    """Return (2, 3) the low and high corners around all objects, metres in the world."""
-    standing = np.concatenate([explained, left, *(v for v, _ in meshes)])
-    standing = standing[np.isfinite(standing).all(1)]
-    if not len(standing):
-        standing = np.array([[-0.3, -0.3, 0], [0.3, 0.3, 0.2]])
-    return np.percentile(standing, [1, 99], axis=0) + np.array([[-BORDER_M], [BORDER_M]])
-
-
-def cloud_of(observation: Observation, meshes: Sequence[tuple[AnyArray, AnyArray]],
-             colours: Sequence[RGB]) -> tuple[dict[str, Any], Float64Array]:
-    """Return (dict of the `seen_points` near the objects, (3,) middle of the objects)."""
-    table, explained, left = seen_points(observation, meshes, colours)
-    low, high = extent_of(explained[0], left[0], meshes)
-    foreground = len(explained[0]) + len(left[0])
-    kept = []
-    for k, (points, rgb) in enumerate((table, explained, left)):
-        inside = np.flatnonzero(((points >= low) & (points <= high)).all(1))
-        most = MAX_TABLE if k == 0 else max(1, MAX_FOREGROUND * len(points) // max(foreground, 1))
-        inside = inside[:: -(-len(inside) // most) or 1]
-        kept.append((points[inside], rgb[inside]))
-    points, rgb = (np.concatenate(part) for part in zip(*kept))
-    return {'n': [len(p) for p, _ in kept], 'low': low.tolist(), 'span': (high - low).tolist(),
-            'p': packed(np.round(65535 * (points - low) / (high - low)), np.uint16),
-            'rgb': packed(rgb.clip(0, 255), np.uint8)}, (low + high) / 2
 
 
 def facts_of(row: Mapping[str, Any]) -> list[list[str]]:

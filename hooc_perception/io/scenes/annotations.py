@@ -1,12 +1,12 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
 """
-Check the files of a scene that only evaluation tools read: labels and strangers.
+The files of a scene that only evaluation reads: categories of labels, strangers.
 
 A mistake in them would surface as a wrong score, so they are checked with the rest of the set.
 """
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from pathlib import Path
 
 from hooc_perception.errors import HoocError
@@ -16,35 +16,39 @@ from hooc_perception.io.scenes.scene import TrueObject
 UNKNOWN_KEYS = ('name', 'translation', 'rotation_xyzw', 'size', 'surface_visibility', 'tag')
 
 
-def check_scene(folder: Path, cameras: Sequence[str], categories: Collection[str]) -> None:
+def label_categories(folder: Path, categories: Collection[str]) -> dict[int, str] | None:
     """
-    Check labels.yaml and well_seen.yaml of a scene's folder, where they exist.
+    Return {label: category} of labels.yaml in a scene's folder, None where there is no such file.
 
+    :param categories: of the set. Names that resemble none of them may be of strangers.
     :raises HoocError: one sentence that names file, field and fix.
     """
-    checks: dict[str, Callable[[Path], None]] = {
-        'labels.yaml': lambda file: _check_labels(file, categories),
-        'well_seen.yaml': lambda file: _check_well_seen(file, cameras)}
-    for name, check in checks.items():
-        if (folder / name).is_file():
-            check(folder / name)
-
-
-def _check_labels(file: Path, categories: Collection[str]) -> None:
-    """Check {label: category}; names that resemble no category may be of strangers."""
+    file = folder / 'labels.yaml'
+    if not file.is_file():
+        return None
+    out = {}
     for label, category in files.read_yaml(file).items():
-        fields.integer(label, 1, 255, f'{file}: a label')
         near = fields.nearest(category, categories)
         if category not in categories and near:
             raise HoocError(f'{file}: label {label} is {fields.short_repr(category)}, which is '
                             f'not in dataset.yaml; is {near} meant?')
+        out[fields.integer(label, 1, 255, f'{file}: a label')] = str(category)
+    return out
 
 
-def _check_well_seen(file: Path, cameras: Sequence[str]) -> None:
-    """Check {camera: [labels]}."""
-    for camera, labels in fields.closed(files.read_yaml(file), cameras, f'{file}:').items():
-        for label in fields.sequence(labels, f'{file}: {camera}'):
-            fields.integer(label, 1, 255, f'{file}: {camera}: a label')
+def well_seen(folder: Path, cameras: Sequence[str]) -> dict[str, tuple[int, ...]]:
+    """
+    Return {camera: labels with enough depth} of well_seen.yaml in a scene's folder, {} without.
+
+    :raises HoocError: one sentence that names file, field and fix.
+    """
+    file = folder / 'well_seen.yaml'
+    if not file.is_file():
+        return {}
+    return {camera: tuple(fields.integer(label, 1, 255, f'{file}: {camera}: a label')
+                          for label in fields.sequence(labels, f'{file}: {camera}'))
+            for camera, labels in fields.closed(files.read_yaml(file), cameras,
+                                                f'{file}:').items()}
 
 
 def strangers(folder: Path) -> tuple[TrueObject, ...] | None:

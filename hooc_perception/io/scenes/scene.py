@@ -65,6 +65,8 @@ class RecordedScene(TableFrameScene):
     :ivar source_strangers: things of none of the set's categories that stand there, their names
         as `category`; None for scenes where nobody noted them.
     :ivar label_files: {camera name: 8-bit PNG of instance labels}, where there are any.
+    :ivar label_categories: {label: category}, None where nobody noted them.
+    :ivar well_seen: {camera name: labels with enough depth}, as somebody noted them.
     :ivar mask_files: {camera name: 8-bit PNG, not black where the robot hides the scene}.
     """
 
@@ -77,6 +79,8 @@ class RecordedScene(TableFrameScene):
     table_known: bool = True
     source_strangers: tuple[TrueObject, ...] | None = None
     mask_files: dict[str, Path] = field(default_factory=dict)
+    label_categories: dict[int, str] | None = None
+    well_seen: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     @property
     def truth(self) -> tuple[TrueObject, ...] | None:

@@ -253,13 +253,15 @@ def _scene(folder: Path, camera_names: Sequence[str], set_cameras: Mapping[str, 
               if (folder / f'{camera}_labels.png').is_file()}
     masks = {camera: folder / f'{camera}_mask.png' for camera in camera_names
              if (folder / f'{camera}_mask.png').is_file()}
-    annotations.check_scene(folder, camera_names, [category.name for category in categories])
     truth_file = folder / 'ground_truth.yaml'
     truth = _truth(truth_file, categories) if truth_file.is_file() else None
     cameras = _scene_cameras(folder, camera_names, set_cameras, path)
     return RecordedScene(name, cameras, depth_files, (unit,) * len(depth_files), truth, labels,
                          table_known=world != UNKNOWN_WORLD,
-                         source_strangers=annotations.strangers(folder), mask_files=masks)
+                         source_strangers=annotations.strangers(folder), mask_files=masks,
+                         label_categories=annotations.label_categories(
+                             folder, [category.name for category in categories]),
+                         well_seen=annotations.well_seen(folder, camera_names))
 
 
 def _truth(file: Path, categories: Sequence[Category]) -> tuple[TrueObject, ...]:

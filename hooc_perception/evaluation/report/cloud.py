@@ -1,0 +1,105 @@
+# Copyright 2026 The hooc_perception authors
+# SPDX-License-Identifier: Apache-2.0
+"""The measured points of a scene, by camera and by what explains them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from hooc_perception.core.arrays import AnyArray, Float64Array
+from hooc_perception.core.geometry import back_project
+from hooc_perception.core.render import render_depth
+from hooc_perception.core.types import Observation
+from hooc_perception.evaluation.report import pictures
+from hooc_perception.evaluation.report.pictures import RGB
+import numpy as np
+
+# As core.parsing.unexplained: a pixel within this distance of the composed objects is explained.
+EXPLAINED_M = 0.02
+MAX_FOREGROUND, MAX_TABLE = 24000, 12000
+# Around all that stands: of the table, and below and above.
+BORDER_M = (0.1, 0.1, 0.02)
+# What is farther from every object is the room behind the table.
+REACH_M = 0.5
+TABLE_RGB, UNEXPLAINED_RGB = (150, 154, 160), (255, 60, 60)
+KINDS = ('table', 'explained', 'unexplained')
+
+
+@dataclass(frozen=True)
+class PointGroup:
+    """
+    Readings of one camera.
+
+    :ivar kind: one of KINDS; explained points have the colour of their object.
+    :ivar points: (n, 3) float64 world metres.
+    :ivar rgb: (n, 3) float64, 0-255.
+    """
+
+    camera: str
+    kind: str
+    points: Float64Array
+    rgb: Float64Array
+
+
+def seen_points(observation: Observation, meshes: Sequence[tuple[AnyArray, AnyArray]],
+                colours: Sequence[RGB]) -> list[PointGroup]:
+    """
+    Return a PointGroup of every kind for every camera.
+
+    :param meshes: posed objects, see `world_mesh`; `colours` one (r, g, b) each.
+    """
+    groups = []
+    for view in observation.views:
+        points = back_project(view.depth, view.camera)
+        depth, ids = render_depth(meshes, view.camera)
+        with np.errstate(invalid='ignore'):
+            explained = view.foreground & (np.abs(depth - view.depth) <= EXPLAINED_M)
+        shade = 0.55 + 0.45 * pictures.hillshade(view.depth, view.camera)
+        table = view.table & ~view.foreground & np.isfinite(view.depth)
+        for kind, mask in zip(KINDS, (table, explained, view.foreground & ~explained)):
+            rgb = np.full((mask.sum(), 3), TABLE_RGB, float)
+            if kind == 'explained':
+                rgb = np.array([*colours, (0, 0, 0)], float)[ids[mask]]
+            elif kind == 'unexplained':
+                rgb[:] = UNEXPLAINED_RGB
+            groups.append(PointGroup(view.camera.name, kind, points[mask],
+                                     rgb * shade[mask][:, None]))
+    return groups
+
+
+def extent_of(groups: Sequence[PointGroup],
+              meshes: Sequence[tuple[AnyArray, AnyArray]]) -> tuple[Float64Array, Float64Array]:
+    """
+    Return ((3,) low, (3,) high), the corners of a box around all that stands, metres.
+
+    Every mesh is inside. Points extend the box, up to REACH_M beyond the meshes, if there are
+    any; the outermost hundredth does not count.
+    """
+    standing = np.concatenate([np.zeros((0, 3)),
+                               *(g.points for g in groups if g.kind != 'table')])
+    standing = standing[np.isfinite(standing).all(1)]
+    posed = [v for v, _ in meshes if len(v) and np.isfinite(v).all()]
+    if not len(standing) and not posed:
+        return np.array([-0.4, -0.4, -0.05]), np.array([0.4, 0.4, 0.3])
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    if len(standing):
+        low, high = np.percentile(standing, [1, 99], axis=0)
+    if posed:
+        first, last = (np.array([f(v, axis=0) for v in posed]) for f in (np.min, np.max))
+        first, last = first.min(0), last.max(0)
+        low = np.minimum(np.maximum(low, first - REACH_M), first)
+        high = np.maximum(np.minimum(high, last + REACH_M), last)
+    return low - BORDER_M, high + BORDER_M
+
+
+def thinned(groups: Sequence[PointGroup], low: AnyArray, high: AnyArray) -> list[PointGroup]:
+    """Return the groups with their points in a box, few enough for a page."""
+    inside = [np.flatnonzero(((g.points >= low) & (g.points <= high)).all(1)) for g in groups]
+    total = {is_table: sum(len(rows) for g, rows in zip(groups, inside)
+                           if (g.kind == 'table') == is_table) for is_table in (True, False)}
+    out = []
+    for group, rows in zip(groups, inside):
+        is_table = group.kind == 'table'
+        step = -(-total[is_table] // (MAX_TABLE if is_table else MAX_FOREGROUND)) or 1
+        out.append(PointGroup(group.camera, group.kind, group.points[rows[::step]],
+                              group.rgb[rows[::step]]))
+    return out

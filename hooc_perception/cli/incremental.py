@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Sequence
 import time
 from typing import Any, TYPE_CHECKING
 
-from hooc_perception.core.arrays import UInt32Array
 from hooc_perception.errors import HoocError
 from hooc_perception.scene import Scene
 
@@ -32,6 +31,7 @@ def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagSc
     :param read: per scene (DepthViews, anything), or the HoocError that reading gave.
     """
     from hooc_perception.core.parsing.tracking import Tracker
+    from hooc_perception.io.scenes.results import with_ids
     of_scene = {name: sequence for sequence in sequences for name in sequence.scenes}
     tracker, current, number = Tracker(parser.models), None, 0
     previous: Scene | None = None
@@ -53,13 +53,4 @@ def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagSc
         previous, seconds = result, time.monotonic() - start
         ids, _ = tracker.update(stamp_ns, result.parsed.objects)
         unknown_ids = tracker.update_unknown(stamp_ns, result.parsed.unknown)
-        yield _with_ids(result.to_dict(), ids, unknown_ids), seconds
-
-
-def _with_ids(entry: dict[str, Any], ids: UInt32Array, unknown_ids: UInt32Array,
-              ) -> dict[str, Any]:
-    """Return a scene of a results file with the ids of its objects."""
-    for key, numbers in (('objects', ids), ('unknown', unknown_ids)):
-        for thing, number in zip(entry.get(key, ()), numbers.tolist()):
-            thing['id'] = number
-    return entry
+        yield with_ids(result.to_dict(), ids, unknown_ids), seconds

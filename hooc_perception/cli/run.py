@@ -3,7 +3,7 @@
 """`hooc run`: replayed bags through the five nodes."""
 
 from argparse import ArgumentParser, Namespace
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 import sys
 from typing import Any, cast, TYPE_CHECKING
@@ -49,7 +49,8 @@ def run(args: Namespace) -> int:
     from hooc_perception.cli.failures import tell_failures
     from hooc_perception.cli.places import relative_place
     from hooc_perception.io.bags.reader import BagScene
-    from hooc_perception.io.scenes.results import scene_result, write_results
+    from hooc_perception.io.bags.sequences import frame_sets
+    from hooc_perception.io.scenes.results import scene_result, with_ids, write_results
     from hooc_perception.trained.folder import load_model_folder
     if not args.timeout > 0:
         raise HoocError(f'--timeout is {args.timeout:g}; give a positive number of seconds')
@@ -62,19 +63,21 @@ def run(args: Namespace) -> int:
         if bag.info['categories']:
             warn_of_gap(classes, bag.info['categories'], bag.path)
     answers, failures, profile, seed = play(bags, args, model)
-    done = [bag for bag in bags if bag.name in answers]
-    entries = [scene_result(
-        bag.name, answer.parsed, classes, answer.seconds, images=answer.images,
-        bag=relative_place(bag.path, args.out), **bag.world)
-        for bag, answer in ((bag, answers[bag.name]) for bag in done)]
+    # Per frame set of a sequence, or per bag: where it is recorded, and its result.
+    done = [(scene, bag, answer) for bag in bags if bag.name in answers
+            for scene, answer in zip(frame_sets(bag) or (bag,), answers[bag.name])]
+    entries = [with_ids(scene_result(
+        scene.name, answer.parsed, classes, answer.seconds, images=answer.images,
+        bag=relative_place(bag.path, args.out), **bag.world), answer.ids)
+        for scene, bag, answer in done]
     if done:
-        write_results(args.out, done[0].info['dataset'], entries, profile=profile, seed=seed,
+        write_results(args.out, done[0][0].info['dataset'], entries, profile=profile, seed=seed,
                       model=relative_place(args.model, args.out))
         found = sum(len(entry['objects']) for entry in entries)
         print(f'{args.out}: {found} objects in {len(entries)} '
               f'scene{"s" if len(entries) != 1 else ""}')
         if args.report:
-            write_report(args, done, answers, entries, model,
+            write_report(args, done, entries, model,
                          f'Profile {profile}, seed {seed}, through the nodes')
     return tell_failures(failures)
 
@@ -158,11 +161,11 @@ def model_defaults(model: 'ModelFolder') -> dict[str, dict[str, Any]]:
 
 
 def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
-         ) -> 'tuple[dict[str, FrameSetResult], dict[str, HoocError], str, int]':
+         ) -> 'tuple[dict[str, list[FrameSetResult]], dict[str, HoocError], str, int]':
     """
     Play all bags through the nodes.
 
-    :return: ({scene: FrameSetResult}, {scene: HoocError}, profile, seed); the last two as the
+    :return: ({bag: [FrameSetResult]}, {bag: HoocError}, profile, seed); the last two as the
         nodes report them.
     """
     from hooc_perception.supervisor.bags import BagRunner, MATCH_TIMEOUT_S
@@ -172,10 +175,6 @@ def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
     # A recorded frame set is complete, however long it waits.
     parameters[INGESTION].update(max_frame_age_s=0.0,
                                  wait_for_answer_s=min(args.timeout, LONGEST_WAIT_S))
-    # Each bag is a scene of its own: nothing is tracked or taken over from the last one.
-    parameters[PARSING].update(track_ttl_s=0.0)
-    for node in CHAIN:
-        parameters[node].update(incremental=False)
     parameters[REPLAY] = {'match_timeout_s': MATCH_TIMEOUT_S}
     with Supervisor((*CHAIN, REPLAY), parameters, isolated=True, verbose=args.verbose,
                     params_file=args.params, defaults=model_defaults(model)) as supervisor:
@@ -186,9 +185,9 @@ def play(bags: 'Sequence[BagScene]', args: Namespace, model: 'ModelFolder',
 
 
 def play_all(runner: 'BagRunner', bags: 'Iterable[BagScene]',
-             ) -> 'tuple[dict[str, FrameSetResult], dict[str, HoocError]]':
-    """Return the results and errors by scene; after a failure the next scene follows."""
-    answers: dict[str, FrameSetResult] = {}
+             ) -> 'tuple[dict[str, list[FrameSetResult]], dict[str, HoocError]]':
+    """Return the results and errors by bag; after a failure the next bag follows."""
+    answers: dict[str, list[FrameSetResult]] = {}
     failures: dict[str, HoocError] = {}
     over = None
     for bag in bags:
@@ -197,7 +196,7 @@ def play_all(runner: 'BagRunner', bags: 'Iterable[BagScene]',
                                            f'({over})')
             continue
         try:
-            answers[bag.name] = runner.play(bag)
+            answers[bag.name] = results_of(runner, bag)
         except HoocError as error:
             failures[bag.name] = error
             try:
@@ -207,16 +206,26 @@ def play_all(runner: 'BagRunner', bags: 'Iterable[BagScene]',
     return answers, failures
 
 
-def write_report(args: Namespace, bags: 'Sequence[BagScene]',
-                 answers: 'Mapping[str, FrameSetResult]',
+def results_of(runner: 'BagRunner', bag: 'BagScene') -> 'list[FrameSetResult]':
+    """Return the results of all frame sets of a sequence, or of the last one of another bag."""
+    last = runner.play(bag)
+    if bag.info['sequence'] is None:
+        return [last]
+    results, expected = runner.results, len(bag.info['sequence']['frame_sets'])
+    if len(results) != expected:
+        raise HoocError(f'{bag.path}: {len(results)} of the {expected} frame sets of the sequence '
+                        'were answered; --verbose shows what the nodes say')
+    return results
+
+
+def write_report(args: Namespace, done: 'Sequence[tuple[BagScene, BagScene, FrameSetResult]]',
                  entries: Sequence[dict[str, Any]], model: 'ModelFolder', note: str) -> None:
     """Write DIR/report.html from what the nodes have published."""
     from hooc_perception.evaluation.report.page import write_report as write_page
     from hooc_perception.evaluation.report.scene import report_scene
     models = {m.name: m for m in model.models}
-    scenes = [report_scene(entry, bag.views(answer.images), models, bag.truth,
+    scenes = [report_scene(entry, scene.views(answer.images), models, scene.truth,
                            probabilities=answer.probabilities, pool=answer.parsed.pool)
-              for entry, bag, answer in (
-                  (entry, bag, answers[bag.name]) for entry, bag in zip(entries, bags))]
-    print(write_page(args.report, scenes, f'Objects on the table: {bags[0].info["dataset"]}',
-                     [note]))
+              for entry, (scene, _, answer) in zip(entries, done)]
+    title = f'Objects on the table: {done[0][0].info["dataset"]}'
+    print(write_page(args.report, scenes, title, [note]))

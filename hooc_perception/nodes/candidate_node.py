@@ -59,11 +59,11 @@ class Proposal:
     def _on_set(self, stamp_ns: int, observation: Observation, messages: dict[str, Any]) -> None:
         """Propose candidates for one frame set."""
         start = time.monotonic()
-        probabilities = probabilities_from_message(messages['probabilities'], observation,
-                                                   len(self.models))
         self._parser = self._parser.changed(node_profile(self._node, self._model))
         candidates = Candidates.empty()
         if self._is_asked(observation):
+            probabilities = probabilities_from_message(messages['probabilities'], observation,
+                                                       len(self.models))
             candidates = self._parser.propose(self._parser.frame(observation, probabilities),
                                               self._node.config.seed)
         poses, attributes = candidates_messages(

@@ -8,6 +8,7 @@ import time
 from typing import Any
 
 from hooc_perception.chain import CLASSIFICATION
+from hooc_perception.core.arrays import UInt8Array
 from hooc_perception.core.classification.classify import KIND_PAPER
 from hooc_perception.core.incremental.carry import carried
 from hooc_perception.core.incremental.memory import Memory
@@ -55,6 +56,10 @@ class Classification:
         warmed(node, model, lambda observation, *_: self._parser.classify(observation))
         # Of the last frame set; None: the next one is classified in any case.
         self._memory: Memory | None = None
+        # The observation of the last set, and what was sent for it: probabilities, label images,
+        # number of pixels.
+        self._sent_for: Observation | None = None
+        self._sent: tuple[PointCloud2, list[UInt8Array], int]
         self._last: PixelProbabilities | None = None
         self._probabilities = node.publisher(PointCloud2, 'pixels/probabilities')
         self._labels = [
@@ -67,16 +72,25 @@ class Classification:
         """Classify one frame set."""
         start, diagnostics = time.monotonic(), self._node.diagnostics
         self._check_rig(observation)
-        self._parser = self._parser.changed(node_profile(self._node, self._model))
-        probabilities = self._classified(observation)
-        self._probabilities.publish(probabilities_message(
-            probabilities, observation.in_target_frame(), self._classes,
-            header(stamp_ns, self._node.config.target_frame)))
+        parser, self._parser = self._parser, self._parser.changed(
+            node_profile(self._node, self._model))
+        head = header(stamp_ns, self._node.config.target_frame)
+        if (observation is self._sent_for and parser is self._parser
+                and self._node.config.incremental):
+            # The very same views: the messages of the last set, with another stamp.
+            message, images, n = self._sent
+            message.header = head
+        else:
+            probabilities = self._classified(observation)
+            message = probabilities_message(probabilities, observation.in_target_frame(),
+                                            self._classes, head)
+            images, n = label_images(probabilities, observation), len(probabilities.camera)
+        self._sent_for, self._sent = observation, (message, images, n)
+        self._probabilities.publish(message)
         seconds = time.monotonic() - start
-        images = label_images(probabilities, observation)
         for name, publisher, image in zip(self._names, self._labels, images):
             publisher.publish(labels_message(image, header(stamp_ns, messages['frames'][name])))
-        diagnostics.ok('classify', seconds=seconds, pixels=len(probabilities.camera))
+        diagnostics.ok('classify', seconds=seconds, pixels=n)
 
     def _classified(self, observation: Observation) -> PixelProbabilities:
         """Return the probabilities: those of the last frame set where nothing has changed."""

@@ -11,6 +11,7 @@ from typing import Any
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import PARSING
+from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.config import param
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import inverse
@@ -53,6 +54,7 @@ from hooc_perception.ros.outputs.detect_service import DetectService
 from hooc_perception.ros.outputs.detected import detected_scene
 from hooc_perception.ros.outputs.event_output import EventOutput
 from hooc_perception.ros.outputs.object_output import ObjectOutput
+import numpy as np
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import SetBool, Trigger
 
@@ -130,6 +132,8 @@ class Parsing:
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set,
             lambda: self.enabled)
         self.adapters = adapters_of(node)
+        # What stood on the table, and what of it the objects left unexplained.
+        self._explained: tuple[tuple[Any, ...], Float64Array] | None = None
         # Monotonic seconds of the result that stands; None: there is none.
         self._answered: float | None = None
         node.steady_timer(0.5, self._on_timer)
@@ -146,8 +150,7 @@ class Parsing:
 
     def _parsed(self, observation: Observation, messages: dict[str, Any]) -> ParsedScene:
         """Return the ParsedScene, in the target frame, of what came together for one stamp."""
-        n, config = len(self.models), self._node.config
-        probabilities = probabilities_from_message(messages['probabilities'], observation, n)
+        config = self._node.config
         pool = candidates_from_messages(messages['poses'], messages['attributes'],
                                         [len(model.members) for model in self.models])
         parser = self._parser = self._parser.changed(node_profile(self._node, self._model),
@@ -156,7 +159,8 @@ class Parsing:
         pool = pool if T is None else pool.moved(inverse(T))
 
         def frame() -> Frame:
-            return parser.frame(observation, probabilities)
+            return parser.frame(observation, probabilities_from_message(
+                messages['probabilities'], observation, len(self.models)))
 
         def candidates(seen: Frame) -> Candidates:
             # Stage 3 leaves out what it does not take to have changed.
@@ -176,8 +180,8 @@ class Parsing:
         self._tracker.config = self._hidden.config = node.config
         ids, objects = self._tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
-        observation = observation.in_target_frame()
-        left = unexplained_points(observation, objects, self.models)
+        seen, observation = observation, observation.in_target_frame()
+        left = self._left(seen, observation, objects)
         found = len(ids)
         parsed, ids = self._hidden.update(stamp_ns, parsed, ids, observation)
         self._tracker.hold(ids, stamp_ns)
@@ -193,6 +197,19 @@ class Parsing:
         node.diagnostics.ok('parse', seconds=time.monotonic() - start, objects=len(ids),
                             hidden=len(ids) - found, age_s=age_s,
                             energy=float(parsed.energy.total))
+
+    def _left(self, seen: Observation, observation: Observation,
+              objects: Candidates) -> Float64Array:
+        """
+        Return the points (n, 3) that no object explains.
+
+        :param seen: what came; `observation` the same in the target frame.
+        """
+        key = seen, objects.translation, objects.rotation_xyzw, objects.size
+        if self._explained is None or self._explained[0][0] is not seen or not all(
+                map(np.array_equal, key[1:], self._explained[0][1:])):
+            self._explained = key, unexplained_points(observation, objects, self.models)
+        return self._explained[1]
 
     def retract(self) -> None:
         """Publish that nothing is known any more; objects that return in time keep their ids."""

@@ -18,6 +18,8 @@ from hooc_perception.supervisor.supervisor import Supervisor
 MATCH_TIMEOUT_S = 30.0
 # Subscribers of every image: ingestion and the collector, and the recorder if there is one.
 SUBSCRIBERS = 2
+# Objects of a sequence keep their ids while they are out of sight.
+TRACK_TTL_S = 30.0
 # If all nodes are idle for this many seconds without a result, the frame set was lost.
 LOST_AFTER_S = 8
 T = TypeVar('T')
@@ -44,10 +46,19 @@ class BagRunner:
         self._collector = Collector(supervisor.node)
         # (parameters of the rig, max_instances) that the chain is configured for.
         self._rig: tuple[dict[str, Any], int] | None = None
+        self._is_up = False
+
+    @property
+    def results(self) -> list[FrameSetResult]:
+        """Return the results of all frame sets of the last bag, if it was a sequence."""
+        return [result for _, result in sorted(self._collector.results.items())]
 
     def play(self, bag: BagScene) -> FrameSetResult:
         """
         Return the result of the last frame set of a bag.
+
+        The frame sets of a sequence follow one another: the next one is sent when the last one
+        is answered. Those of other bags are parsed each by itself.
 
         If the frame set gets lost in transport, the bag is played once more, with a warning.
 
@@ -65,9 +76,10 @@ class BagRunner:
     def _play(self, bag: BagScene) -> FrameSetResult:
         supervisor, collector = self._supervisor, self._collector
         self._set_up(bag)
-        collector.expect([camera.name for camera in bag.cameras])
+        moving = bag.info['sequence'] is not None
+        collector.expect([camera.name for camera in bag.cameras], moving)
         supervisor.set_parameters(REPLAY, {
-            'bag': str(bag.path.resolve()),
+            'bag': str(bag.path.resolve()), 'rate': 0.0 if moving else 1.0,
             'wait_for_subscribers': SUBSCRIBERS + bool(self._record)})
         recorder = None
         if self._record:
@@ -88,7 +100,7 @@ class BagRunner:
 
     def start_over(self) -> None:
         """Bring all nodes down after a scene that failed; HoocError if one has died."""
-        self._rig = None
+        self._rig, self._is_up = None, False
         self._supervisor.bring_down()
 
     def _collect(self, bag: BagScene, began: int) -> FrameSetResult:
@@ -134,19 +146,22 @@ class BagRunner:
         info = bag.info
         rig = {'cameras': tuple(camera.name for camera in bag.cameras),
                'target_frame': info['world_frame'] or 'table'}
-        limit = info['max_instances']
-        if (rig, limit) == self._rig:
+        limit, moving = info['max_instances'], info['sequence'] is not None
+        # A sequence begins with nothing known; so does each bag without one, frame set by set.
+        if (rig, limit) == self._rig and not moving:
             return
-        if self._rig is not None:
+        if self._is_up:
             self._supervisor.bring_down(CHAIN)
+        self._is_up = True
         # A recorded frame set is complete, however long its images take.
         own = {INGESTION: {'camera_timeout_s': 0.0, 'explain_after_s': 0.0},
-               PARSING: {'max_instances': limit}}
+               PARSING: {'max_instances': limit, 'track_ttl_s': TRACK_TTL_S if moving else 0.0}}
         for name in CHAIN:
             self._supervisor.set_parameters(
-                name, {**rig, 'wait_for_stages': True, **own.get(name, {})})
+                name, {**rig, 'wait_for_stages': True, 'incremental': moving,
+                       **own.get(name, {})})
         self._supervisor.bring_up(CHAIN)
-        self._rig = rig, limit
+        self._rig = None if moving else (rig, limit)
 
     def _wait(self, condition: Callable[[], T | None], began_ns: int, timeout_s: float,
               complaint: str | Callable[[], str]) -> T:

@@ -11,6 +11,7 @@ from typing import Any, TypeAlias
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import INGESTION
+from hooc_perception.core.arrays import UInt32Array
 from hooc_perception.core.types import Candidates, Energy, ParsedScene, PixelProbabilities
 from hooc_perception.ros.messages.conversions import nanoseconds
 from hooc_perception.ros.messages.point_clouds import cloud_rows
@@ -20,6 +21,7 @@ from hooc_perception.ros.messages.stages import (
 )
 from hooc_perception.ros.messages.unknown import unknown_from_messages
 from hooc_perception.ros.qos import qos
+import numpy as np
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import Image, PointCloud2
@@ -36,6 +38,7 @@ class FrameSetResult:
     :ivar seconds: from the arrival of the last depth image to the publication of the objects.
     :ivar probabilities: None if they were not received.
     :ivar images: {camera: index of its image in the bag, from 0 on}.
+    :ivar ids: (n,) uint32 of the objects.
     """
 
     stamp_ns: int
@@ -43,6 +46,7 @@ class FrameSetResult:
     seconds: float
     probabilities: PixelProbabilities | None
     images: dict[str, int]
+    ids: UInt32Array
 
 
 _INGESTION = f'{INGESTION}: '
@@ -64,6 +68,7 @@ class Collector:
     :ivar last_sent: stamp of the last frame set of the ingestion node, None before the first.
     :ivar replay: the last content of `replay/status`.
     :ivar errors: (time in ns, sentence) of the errors in /diagnostics.
+    :ivar results: {stamp in ns: FrameSetResult} of all frame sets, where `expect` asked for them.
     """
 
     def __init__(self, node: Node) -> None:
@@ -78,8 +83,13 @@ class Collector:
         node.create_subscription(DiagnosticArray, '/diagnostics', on_diagnostics, 10)
         self.expect(())
 
-    def expect(self, cameras: Iterable[str]) -> None:
-        """Forget the last bag and subscribe to these cameras."""
+    def expect(self, cameras: Iterable[str], every: bool = False) -> None:
+        """
+        Forget the last bag and subscribe to these cameras.
+
+        :param every: whether the results of all frame sets are kept, not only the last ones.
+        """
+        self._every, self.results = every, dict[int, FrameSetResult]()
         for subscription in self._images:
             self._node.destroy_subscription(subscription)
         # Topic -> {stamp: message}, and what follows from the messages, by stamp.
@@ -121,6 +131,11 @@ class Collector:
         return take
 
     def _note_news(self, info: Info) -> None:
+        if self._every:
+            for stamp in self._published.keys() - self.results.keys():
+                result = self.result(stamp)
+                if result is not None:
+                    self.results[stamp] = result
         self._news_ns = max(self._news_ns, info['source_timestamp'])
         self._reports.clear()
 
@@ -197,7 +212,7 @@ class Collector:
         return FrameSetResult(
             stamp_ns, parsed, max(0.0, (self._published[stamp_ns] - arrived) * 1e-9),
             None if probabilities is None else probabilities_from_message(probabilities),
-            self.images_of(stamp_ns))
+            self.images_of(stamp_ns), rows['id'].astype(np.uint32))
 
     def images_of(self, stamp_ns: int) -> dict[str, int]:
         """Return {camera: index of its image} of a frame set: the first ones not before it."""

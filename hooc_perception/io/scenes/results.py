@@ -37,6 +37,15 @@ def scene_entry(name: str, entry: Mapping[str, Any], seconds: float, **extra: An
     return {'scene': name, 'seconds': float(seconds), **entry, **extra}
 
 
+def with_ids(entry: dict[str, Any], ids: Iterable[int], unknown_ids: Iterable[int] = (),
+             ) -> dict[str, Any]:
+    """Return the dict of a scene with the ids of its objects."""
+    for key, numbers in (('objects', ids), ('unknown', unknown_ids)):
+        for thing, number in zip(entry.get(key, ()), numbers):
+            thing['id'] = int(number)
+    return entry
+
+
 def parsed_entry(parsed: ParsedScene, category_names: Sequence[str]) -> dict[str, Any]:
     """
     Return energy and objects of a ParsedScene as plain numbers and lists.

@@ -51,6 +51,7 @@ class BagRunner:
     @property
     def results(self) -> list[FrameSetResult]:
         """Return the results of all frame sets of the last bag, if it was a sequence."""
+        self._collector.keep_results()
         return [result for _, result in sorted(self._collector.results.items())]
 
     def play(self, bag: BagScene) -> FrameSetResult:

@@ -132,10 +132,7 @@ class Collector:
 
     def _note_news(self, info: Info) -> None:
         if self._every:
-            for stamp in self._published.keys() - self.results.keys():
-                result = self.result(stamp)
-                if result is not None:
-                    self.results[stamp] = result
+            self.keep_results()
         self._news_ns = max(self._news_ns, info['source_timestamp'])
         self._reports.clear()
 
@@ -184,6 +181,13 @@ class Collector:
             nodes.setdefault(node, []).extend([] if sentence == 'ok' else [f'{thing} {sentence}'])
         return '; '.join(f'{node}: {", ".join(said) or "ok"}' for node, said in nodes.items()) or (
             'no node has reported anything')
+
+    def keep_results(self) -> None:
+        """Keep the results that have become whole in `results`."""
+        for stamp in self._published.keys() - self.results.keys():
+            result = self.result(stamp)
+            if result is not None:
+                self.results[stamp] = result
 
     def newest_result(self) -> FrameSetResult | None:
         """Return the result of the newest frame set that has one, None if none has."""

@@ -17,6 +17,7 @@ from hooc_perception.core.arrays import AnyArray
 from hooc_perception.core.classification.classify import classify, KIND_PAPER
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import inverse, stage_rng
+from hooc_perception.core.incremental.changes import unseen
 from hooc_perception.core.incremental.memory import Memory, next_step, Past, Step
 from hooc_perception.core.incremental.watch import watch
 from hooc_perception.core.parsing.uncertainty import pose_uncertainty
@@ -146,8 +147,7 @@ class Parser:
 
     def step(self, memory: Memory | None, observation: Observation) -> Step:
         """Return what a frame set asks for beside the one before, see `next_step`."""
-        return next_step(memory, observation, self.profile.observe.accumulate.full_share,
-                         self.method.settle_frames)
+        return next_step(memory, observation, self.profile.observe.accumulate)
 
     def follow(self, step: Step, before: ParsedScene | None, frame: Callable[[], Frame],
                pool: Callable[[Frame], Candidates], seed: int = 0, full: bool = False,
@@ -169,7 +169,8 @@ class Parser:
             return replace(before, seconds={})
         seen, extra, region = frame(), Candidates.empty(), step.region
         if full:
-            region, extra = tuple(v.foreground for v in seen.observation.views), pool(seen)
+            region = tuple(~unseen(view) for view in seen.observation.views)
+            extra = pool(seen)
         assert region is not None
         return self._finished(seen, self.method.revise(
             seen, before, region, seed, self.max_instances, full or step.settled, extra), seed)
@@ -215,16 +216,15 @@ class Parser:
 
     def decide(self, frame: Frame, pool: Candidates, seed: int = 0) -> ParsedScene:
         """Stage 4: the subset of candidates that explains the frame, with scores and sigmas."""
-        return self._finished(frame, self.method.parse(frame, pool, seed, self.max_instances),
-                              seed)
+        parsed = self.method.parse(frame, pool, seed, self.max_instances)
+        return self._finished(frame, self.method.calibrate(frame, parsed), seed)
 
     def _finished(self, frame: Frame, parsed: ParsedScene, seed: int) -> ParsedScene:
-        """Return a ParsedScene with the sigmas that it lacks, calibrated scores and the rest."""
+        """Return a ParsedScene with the sigmas that it lacks and things of no category."""
         if self.sigmas:
             parsed = self._with_sigmas(frame, parsed, seed)
         parsed = replace(parsed, objects=canonical_objects(parsed.objects, self.models))
-        return self.method.open_world(frame, self.method.calibrate(frame, parsed),
-                                      self._strangers)
+        return self.method.open_world(frame, parsed, self._strangers)
 
     def _with_sigmas(self, frame: Frame, parsed: ParsedScene, seed: int) -> ParsedScene:
         """Return a ParsedScene with the uncertainty of each pose that has none yet."""

@@ -13,7 +13,7 @@ mean behind it stays as it was.
 from dataclasses import dataclass, replace
 
 from hooc_perception.core.arrays import BoolArray, Float32Array, UInt8Array
-from hooc_perception.core.incremental.changes import changed_pixels, same_camera
+from hooc_perception.core.incremental.changes import changed_pixels, focal_px, same_camera
 from hooc_perception.core.incremental.kernels.windows import accumulate_pixels
 from hooc_perception.core.types import Camera, RectifiedView
 import numpy as np
@@ -81,5 +81,5 @@ def fused_view(accumulated: Accumulated, view: RectifiedView, aside: BoolArray) 
 
 def changed_in(before: Accumulated, view: RectifiedView) -> BoolArray:
     """Return which pixels (H, W) of an image show something else than what was accumulated."""
-    changed = changed_pixels(before.depth, view.depth)
+    changed = changed_pixels(before.depth, view.depth, focal_px(view.camera))
     return changed if view.hidden is None else changed & ~view.hidden

@@ -9,17 +9,19 @@ by far more than noise and are left out.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from hooc_perception.core.arrays import BoolArray, Float32Array
 from hooc_perception.core.incremental.kernels.windows import at_edges, compare_windows
-from hooc_perception.core.types import Camera, Observation
+from hooc_perception.core.types import Camera, Observation, ObservedView
 import numpy as np
 from scipy import ndimage
 
 # The share of a window that must have been measured twice.
 LEAST_SHARE = 0.4
-# Depth that differs by more than this within 3 x 3 pixels, per metre of depth, is an edge.
-EDGE = 0.015
+# Depth that differs by more than this within 3 x 3 pixels, per metre of depth, is an edge. Coarse
+# images have larger steps: what is seen at up to 70 degrees to its normal is none in any of them.
+EDGE, STEEPEST = 0.015, 2.74
 # A window has changed if its mean differs by this multiple of the noise, which grows with the
 # square of the distance; within these bounds. [m]
 STRONG, LEAST_M, MOST_M = 7.0, 0.003, 0.03
@@ -27,21 +29,23 @@ STRONG, LEAST_M, MOST_M = 7.0, 0.003, 0.03
 CLIP_M = 0.05
 # Of a window that was measured before and is not now, or the reverse, this share must be so.
 APPEARED = 0.8
-# Connected changes of fewer pixels are noise.
-FEWEST_PX = 12
+# Connected changes of fewer pixels are noise; so are all changes together, over all views.
+FEWEST_CONNECTED_PX, FEWEST_PX = 12, 30
 # Levelling moves a camera by fractions of a millimetre from frame set to frame set; more than this
 # is another pose. [m; entries of the rotation matrix]
 SAME_PLACE_M, SAME_TURN = 0.005, 0.005
 
 
-def changed_pixels(before: Float32Array, now: Float32Array) -> BoolArray:
+def changed_pixels(before: Float32Array, now: Float32Array, focal_px: float) -> BoolArray:
     """
     Return which pixels (H, W) show something else than before.
 
     :param before, now: (H, W) float32 metres, NaN = none.
+    :param focal_px: focal length of the camera.
     """
     before, now = (np.ascontiguousarray(depth, np.float32) for depth in (before, now))
-    edges = at_edges(before, EDGE) | at_edges(now, EDGE)
+    edge = max(EDGE, 2 * STEEPEST / focal_px)
+    edges = at_edges(before, edge) | at_edges(now, edge)
     shift, share, appeared, gone = compare_windows(before, now, edges, CLIP_M)
     mean, enough = np.abs(shift) / np.maximum(share, 1e-6), share >= LEAST_SHARE
     square = np.fmin(before, now) ** 2
@@ -62,7 +66,7 @@ def changes(before: Observation, now: Observation) -> tuple[BoolArray, ...]:
     """
     Return, per view, which foreground pixels (H, W) of either observation have changed.
 
-    Pixels that the robot or something else hides in either of them tell nothing.
+    Pixels that are not seen in either of them tell nothing, see `unseen`.
 
     :raises ValueError: where the views are not of the same cameras, see `comparable`.
     """
@@ -70,26 +74,40 @@ def changes(before: Observation, now: Observation) -> tuple[BoolArray, ...]:
         raise ValueError('these are observations of different cameras')
     masks = []
     for a, b in zip(before.views, now.views):
-        mask = changed_pixels(a.depth, b.depth)
+        mask = changed_pixels(a.depth, b.depth, focal_px(b.camera))
         mask &= np.asarray(ndimage.binary_dilation(a.foreground | b.foreground), bool)
-        for hidden in (a.hidden, b.hidden):
-            if hidden is not None:
-                mask &= ~hidden
-        masks.append(_large(mask))
+        masks.append(_large(mask & ~unseen(a) & ~unseen(b)))
     return tuple(masks)
+
+
+def unseen(view: ObservedView) -> BoolArray:
+    """
+    Return which pixels (H, W) of a view tell nothing.
+
+    The robot or something else hides them, or the camera has dropped out.
+    """
+    if not np.isfinite(view.depth).any():
+        return np.ones(view.depth.shape, bool)
+    return np.zeros(view.depth.shape, bool) if view.hidden is None else view.hidden
 
 
 def changed_share(before: Observation, now: Observation, masks: Sequence[BoolArray]) -> float:
     """Return the share of the foreground of both observations that has changed, 0 to 1."""
     total = sum(int((a.foreground | b.foreground).sum())
                 for a, b in zip(before.views, now.views))
-    return sum(int(mask.sum()) for mask in masks) / max(total, 1)
+    # Masks reach a pixel beyond the foreground.
+    return min(1.0, sum(int(mask.sum()) for mask in masks) / max(total, 1))
 
 
 def comparable(before: Observation, now: Observation) -> bool:
     """Return whether two observations are of the same cameras in the same places."""
     return len(before.views) == len(now.views) and all(
-        same_camera(a.camera, b.camera) for a, b in zip(before.views, now.views))
+        _same_view(a, b) for a, b in zip(before.views, now.views))
+
+
+def focal_px(camera: Camera) -> float:
+    """Return the focal length of a camera, the shorter one if there are two."""
+    return float(min(camera.K[0, 0], camera.K[1, 1]))
 
 
 def same_camera(before: Camera, now: Camera) -> bool:
@@ -101,6 +119,15 @@ def same_camera(before: Camera, now: Camera) -> bool:
             and float(moved[:3, :3].max()) < SAME_TURN)
 
 
+def _same_view(before: ObservedView, now: ObservedView) -> bool:
+    """Return whether two views are of the same camera in the same place."""
+    a, b = before.camera, now.camera
+    if unseen(before).all() or unseen(now).all():
+        # A camera that sees no table is not levelled: it seems to have moved.
+        b = replace(b, T_world_camera=a.T_world_camera)
+    return same_camera(a, b)
+
+
 def _large(mask: BoolArray) -> BoolArray:
     """Return the pixels (H, W) of connected parts that are no noise."""
     if not mask.any():
@@ -109,4 +136,4 @@ def _large(mask: BoolArray) -> BoolArray:
     ndimage.label(mask, np.ones((3, 3), int), output=labels)
     sizes = np.bincount(labels.ravel())
     sizes[0] = 0
-    return sizes[labels] >= FEWEST_PX
+    return sizes[labels] >= FEWEST_CONNECTED_PX

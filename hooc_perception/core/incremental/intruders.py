@@ -29,6 +29,12 @@ APART = 0.05
 FEWEST_PX = 20
 # A part of a thing that another camera sees reaching in has this share of its points there.
 SAME_SHARE, SAME_M = 0.3, 0.03
+# A part that comes so close to the first or last row or column with readings is cut off there:
+# closing leaves out the outermost ones.
+CUT_PX = 2
+# What another camera shows from end to end, as long as this share of what is cut off here, does
+# not come from outside: it lies at the border of this image.
+WHOLE_SHARE = 0.8
 # Points of each part that are compared.
 MOST_POINTS = 400
 # Around it readings mix with those of the background or are missing. [pixels]
@@ -37,12 +43,25 @@ MARGIN_PX = 5
 
 @dataclass(frozen=True, eq=False)
 class _Part:
-    """A connected part of one image that came nearer: its view, label, points and verdict."""
+    """
+    A connected part of one image that came nearer.
+
+    :ivar view: number of the image, `label` that of the part in it.
+    :ivar points: (n, 3) of it, table frame, metres.
+    :ivar length_m: diagonal of the box around them.
+    :ivar cut: whether it goes on beyond the image or the workspace.
+    """
 
     view: int
     label: int
     points: Float64Array
-    reaching: bool
+    length_m: float
+    cut: bool
+
+    def lies_in(self, tree: KDTree) -> bool:
+        """Return whether it is a part of what the points of a tree show."""
+        distance, _ = tree.query(self.points, distance_upper_bound=SAME_M)
+        return bool(np.mean(np.isfinite(distance)) >= SAME_SHARE)
 
 
 def intruders(before: Sequence[Float32Array | None], views: Sequence[RectifiedView],
@@ -61,14 +80,13 @@ def intruders(before: Sequence[Float32Array | None], views: Sequence[RectifiedVi
         labels.append(label)
         if label.any():
             parts += _parts(k, view, label, config)
-    seeds = [part.points for part in parts if part.reaching]
+    seeds = [part.points for part in parts
+             if _reaches_in(part, parts, config.accumulate.largest_object_m)]
     chosen: list[list[int]] = [[] for _ in views]
     if seeds:
         tree = KDTree(np.concatenate(seeds))
         for part in parts:
-            near = part.reaching or np.mean(
-                tree.query(part.points, distance_upper_bound=SAME_M)[0] < np.inf) >= SAME_SHARE
-            if near:
+            if part.lies_in(tree):
                 chosen[part.view].append(part.label)
     size = 2 * MARGIN_PX + 1
     return [np.asarray(ndimage.maximum_filter(np.isin(label, rows), size), bool) if rows
@@ -92,6 +110,7 @@ def _parts(k: int, view: RectifiedView, labels: Int32Array, config: ObserveConfi
     xyz = back_project(view.depth, view.camera)
     counts = np.bincount(labels.ravel())
     boxes = ndimage.find_objects(labels)
+    borders = [np.flatnonzero(np.isfinite(view.depth).any(axis))[[0, -1]] for axis in (1, 0)]
     for label in np.flatnonzero(counts >= FEWEST_PX):
         box = boxes[label - 1] if label else None
         if box is None:
@@ -102,11 +121,21 @@ def _parts(k: int, view: RectifiedView, labels: Int32Array, config: ObserveConfi
                   & (points[:, 2] < config.max_height_m))
         if inside.sum() < FEWEST_PX:
             continue
-        cut = any(edge.start == 0 or edge.stop == n for edge, n in zip(box, labels.shape))
+        cut = any(edge.start <= first + CUT_PX or edge.stop > last - CUT_PX
+                  for edge, (first, last) in zip(box, borders))
         low, high = np.quantile(points, [0.02, 0.98], axis=0)
-        longest = float(np.linalg.norm(high - low))
-        largest = config.accumulate.largest_object_m
-        reaching = longest > largest or longest > largest / 2 and (
-            cut or int((~inside).sum()) >= FEWEST_PX)
-        parts.append(_Part(k, int(label), points[::max(1, len(points) // MOST_POINTS)], reaching))
+        parts.append(_Part(k, int(label), points[::max(1, len(points) // MOST_POINTS)],
+                           float(np.linalg.norm(high - low)),
+                           cut or int((~inside).sum()) >= FEWEST_PX))
     return parts
+
+
+def _reaches_in(part: _Part, parts: Sequence[_Part], largest_m: float) -> bool:
+    """Return whether a part is of an arm or the like: too long, or long and cut off."""
+    if part.length_m > largest_m:
+        return True
+    if not part.cut or part.length_m <= largest_m / 2:
+        return False
+    tree = KDTree(part.points)
+    return not any(other.lies_in(tree) for other in parts if other.view != part.view
+                   and not other.cut and other.length_m > WHOLE_SHARE * part.length_m)

@@ -12,7 +12,13 @@ from hooc_perception.core.incremental.accumulate import (
     changed_in,
     fused_view,
 )
-from hooc_perception.core.incremental.changes import changed_share, changes, comparable
+from hooc_perception.core.incremental.changes import (
+    changed_share,
+    changes,
+    comparable,
+    FEWEST_PX,
+    unseen,
+)
 from hooc_perception.core.incremental.intruders import intruders
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.observe import observe
@@ -26,14 +32,18 @@ class Watched:
     """
     A frame set together with those before it.
 
-    :ivar observation: of the accumulated depth.
+    :ivar observation: of the accumulated depth; while nothing changes, the same object.
     :ivar accumulated: one per camera; None for a camera that has not shown anything yet.
     :ivar fresh: whether nothing was taken over from earlier frame sets.
+    :ivar calm: how many frame sets in a row have shown no change.
+    :ivar T_target_table: of the observation.
     """
 
     observation: Observation
     accumulated: tuple[Accumulated | None, ...]
     fresh: bool = True
+    calm: int = 0
+    T_target_table: Float64Array | None = None
 
 
 def watch(views: Sequence[RectifiedView], before: Watched | None,
@@ -42,8 +52,9 @@ def watch(views: Sequence[RectifiedView], before: Watched | None,
     """
     Observe a frame set, see `observe`, with the readings of earlier ones.
 
-    Where too much has changed (`full_share`), or where a camera was moved, only the frame set
-    itself counts.
+    While nothing changes, the observation stays as it is; after `settle_frames` it is made anew,
+    and then whenever `accumulate_frames` have passed. Where too much has changed (`full_share`),
+    or where a camera was moved, only the frame set itself counts.
 
     :param before: what this function returned for the frame set before; None = the first.
     :raises HoocError: as `observe` does.
@@ -51,14 +62,15 @@ def watch(views: Sequence[RectifiedView], before: Watched | None,
     frames = config.accumulate.accumulate_frames
     if before is not None and frames > 1 and _continues(before, views):
         watched = _next(views, before, config, T_target_table)
-        if not _is_other(before.observation, watched.observation, config):
+        if (watched.observation is before.observation
+                or not _is_other(before.observation, watched.observation, config)):
             return watched
     return Watched(observe(views, config, T_target_table),
-                   tuple(_first(view) for view in views))
+                   tuple(_first(view) for view in views), T_target_table=T_target_table)
 
 
 def seen_so_far(before: Observation, now: Observation) -> Observation:
-    """Return the latest observation with earlier views of what is hidden in it."""
+    """Return the latest observation with earlier views of what is not seen in it."""
     return replace(now, views=tuple(
         _uncovered(a, b) for a, b in zip(before.views, now.views)))
 
@@ -93,7 +105,33 @@ def _next(views: Sequence[RectifiedView], before: Watched, config: ObserveConfig
         elif before.accumulated[k] is None:
             # A camera that has dropped out shows nothing; what it saw counts when it returns.
             accumulated[k] = _first(view)
-    return Watched(observe(fused, config, T_target_table), tuple(accumulated), False)
+    calm = before.calm + 1 if _is_still(views, before, changed, aside, T_target_table) else 0
+    accumulates = config.accumulate
+    if calm and calm != accumulates.settle_frames and calm % accumulates.accumulate_frames:
+        return replace(before, accumulated=tuple(accumulated), calm=calm, fresh=False)
+    return Watched(observe(fused, config, T_target_table), tuple(accumulated), False, calm,
+                   T_target_table)
+
+
+def _is_still(views: Sequence[RectifiedView], before: Watched, changed: Sequence[BoolArray],
+              aside: Sequence[BoolArray], T_target_table: Float64Array | None) -> bool:
+    """Return whether a frame set shows what the last observation shows, with other noise."""
+    if not np.array_equal(_matrix(before.T_target_table), _matrix(T_target_table)):
+        return False
+    pixels = 0
+    for seen, view, mask, away in zip(before.observation.views, views, changed, aside):
+        # Behind the table readings come and go.
+        pixels += int((mask & (seen.table | seen.foreground)).sum())
+        if pixels >= FEWEST_PX or away.any() or view.hidden is not None:
+            return False
+        if seen.hidden is not None or (
+                np.isfinite(seen.depth).any() != np.isfinite(view.depth).any()):
+            return False
+    return True
+
+
+def _matrix(T: Float64Array | None) -> Float64Array:
+    return np.eye(4) if T is None else T
 
 
 def _first(view: RectifiedView) -> Accumulated | None:
@@ -102,10 +140,11 @@ def _first(view: RectifiedView) -> Accumulated | None:
 
 
 def _uncovered(before: ObservedView, now: ObservedView) -> ObservedView:
-    """Return a view in which hidden pixels show what was seen there before."""
-    if now.hidden is None:
+    """Return a view in which pixels that are not seen show what was seen there before."""
+    away = unseen(now)
+    if not away.any():
         return now
-    hidden: BoolArray = np.zeros_like(now.hidden) if before.hidden is None else before.hidden
-    return replace(now, depth=np.where(now.hidden, before.depth, now.depth),
-                   foreground=np.where(now.hidden, before.foreground, now.foreground),
-                   hidden=now.hidden & hidden)
+    camera = before.camera if away.all() else now.camera
+    return replace(now, camera=camera, depth=np.where(away, before.depth, now.depth),
+                   foreground=np.where(away, before.foreground, now.foreground),
+                   hidden=away & unseen(before))

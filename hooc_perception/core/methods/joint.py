@@ -54,11 +54,6 @@ class JointMethod:
         """Return the object costs of the joint energy."""
         return self._parse.objects
 
-    @property
-    def settle_frames(self) -> int:
-        """Return after how many frame sets without change a change is looked at again."""
-        return self._parse.revise.settle_frames
-
     def propose(self, frame: Frame, seed: int) -> Candidates:
         """Return candidates of every category, the best of each first."""
         return propose(frame, self._propose, self.pixels, stage_rng(seed, 'propose'))
@@ -108,7 +103,8 @@ class JointMethod:
         found = improved(frame, start, config.revise.revise_rounds, rng, more, deadline.passed)
         parsed, search = self._decided(frame, *found, deadline, rng,
                                        self._parse.revise.revise_gain if settled else 0.0)
-        return with_held(parsed, before, search.held[search.mask], held_before)
+        return with_held(self.calibrate(frame, parsed), before, search.held[search.mask],
+                         held_before)
 
     def _decided(self, frame: Frame, search: Search, found: SearchResult, considered: Candidates,
                  deadline: Deadline, rng: np.random.Generator, gain: float = 0.0,

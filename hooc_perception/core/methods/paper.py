@@ -41,8 +41,6 @@ class PaperMethod:
 
     # The paper has no such costs: these only describe the result, in the units of the others.
     pixels, objects = PixelCosts(unknown_weight=0.0), ObjectCosts()
-    # It looks at frame sets one by one.
-    settle_frames = 0
 
     def __init__(self, propose: FragmentConfig = FragmentConfig(),
                  parse: PaperParseConfig = PaperParseConfig()) -> None:

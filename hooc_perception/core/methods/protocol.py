@@ -30,11 +30,6 @@ class Method(Protocol):
         """Return the object costs by which uncertainty is measured."""
         ...
 
-    @property
-    def settle_frames(self) -> int:
-        """Return after how many frame sets without change a change is looked at again."""
-        ...
-
     def propose(self, frame: Frame, seed: int) -> Candidates:
         """Return candidates of every category, the best of each first."""
         ...
@@ -52,7 +47,7 @@ class Method(Protocol):
                max_instances: int = 0, settled: bool = False,
                extra: Candidates = Candidates.empty()) -> ParsedScene:
         """
-        Return the objects of a frame set that follows one whose answer is known.
+        Return the objects of a frame set that follows one whose answer is known, calibrated.
 
         :param before: the answer, in the table frame.
         :param region: per view (H, W) bool, what is decided anew.

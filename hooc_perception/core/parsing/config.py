@@ -41,10 +41,6 @@ class ReviseConfig(Config):
     least_effort: float = param(
         0.3, 'Where little has changed, this share of the candidates of a round of re-proposal is '
         'enough; where a third of the foreground has changed, all are drawn.', '', 0.01, 1.0)
-    settle_frames: int = param(
-        4, 'What has changed is looked at again, with the readings of all frame sets since, when '
-        'so many frame sets in a row have shown no further change; 0 = never.', '', 0, 1000,
-        runtime=True)
     revise_gain: float = param(
         40.0, 'Where nothing has changed, another object must be better by this to replace '
         'that of the previous answer.', 'px', 0.0, 1e5, runtime=True)

@@ -96,6 +96,7 @@ class Search:
             hypotheses_of(self.pool, evidence.shapes), evidence.shapes.of(self.pool),
             config.pixels.weights())
         self._penalty: Float64Array | None = None
+        self._favour = 0.0
         self._energy: JointEnergy | None = None
 
     @property
@@ -231,14 +232,19 @@ class Search:
         self._penalty = penalty
 
     def favour_kept(self, pixels: float) -> None:
-        """Let each candidate that stays in the pool cost so much less, in pixels."""
+        """Let each candidate that stays in the pool cost so much less in the search, in pixels."""
         penalty = np.full(len(self.pool), self.config.objects.base_cost) \
             if self._penalty is None else self._penalty
-        self._penalty = penalty - pixels * self.kept
+        self._penalty, self._favour = penalty - pixels * self.kept, pixels
 
     def marginal_energies(self) -> Float64Array:
-        """Return (chosen,) how much the energy rises if an object is removed, in pixels."""
-        return self.energy.deltas()[self.mask]
+        """
+        Return (chosen,) how much the energy rises if an object is removed, in pixels.
+
+        What favours an object does not count: it is no evidence of it.
+        """
+        favour = self._favour * self.evidence.scale * self.kept[self.mask]
+        return self.energy.deltas()[self.mask] - favour
 
     def _shown(self) -> Context:
         """Return the Context of the chosen candidates."""

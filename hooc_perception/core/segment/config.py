@@ -18,6 +18,10 @@ class AccumulateConfig(Config):
     accumulate_frames: int = param(
         12, 'While a scene stands still, depth is averaged over as many frame sets; it starts '
         'again where something changes. 1 = every frame set by itself.', '', 1, 200, runtime=True)
+    settle_frames: int = param(
+        4, 'While a scene stands still, its views stay as they are. When so many frame sets in a '
+        'row have shown no change, the readings of all of them make up new views, and what has '
+        'changed before is decided again; 0 = never.', '', 0, 1000, runtime=True)
     largest_object_m: float = param(
         0.5, 'What comes into the scene and is longer than this is an arm or a hand, no object; '
         'so is what is half as long and reaches beyond the image or the workspace. It is set '

@@ -5,16 +5,17 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter as now
+from typing import Any, TypeVar
 
 from hooc_perception.benchmark.scene import BenchScene
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import DepthView
 from hooc_perception.parser import Parser
-from hooc_perception.scene import Scene
 from hooc_perception.trained.folder import ModelFolder
 import numpy as np
 
+T = TypeVar('T')
 # Frame sets without change; objects that are taken and put back.
 STILL, CHANGES = 8, 4
 # Noise of the readings from one frame set to the next, in metres at 1 m: a Kinect v2's.
@@ -22,7 +23,7 @@ NOISE_M = 0.0015
 
 
 @dataclass(frozen=True)
-class LiveTime:
+class FollowingTime:
     """
     Seconds per frame set.
 
@@ -37,12 +38,12 @@ class LiveTime:
     ratio: float
 
 
-def live_times(folder: ModelFolder, scene: BenchScene, seed: int = 0) -> list[LiveTime]:
+def live_times(folder: ModelFolder, scene: BenchScene, seed: int = 0) -> list[FollowingTime]:
     """Return the times of frame sets that show no change, an object taken, an object put."""
     parser, rng = Parser.load(folder, max_instances=0, sigmas=False), stage_rng(seed, 'bench/live')
     nothing: set[int] = set()
 
-    def update(gone: set[int], previous: Scene | None) -> tuple[Scene, float]:
+    def update(gone: set[int], previous: Any) -> tuple[Any, float]:
         views = _views(scene, gone, rng)
         return _timed(lambda: parser.update(views, previous, folder.seed))
 
@@ -58,12 +59,13 @@ def live_times(folder: ModelFolder, scene: BenchScene, seed: int = 0) -> list[Li
             last, seconds = update(gone, last)
             times.append(seconds)
     alone = float(np.median(whole[1:]))
-    return [LiveTime(what, float(np.median(times)), max(times), alone / float(np.median(times)))
-            for what, times in (('every frame set by itself', whole[1:]), ('no change', still),
-                                ('an object taken', taken), ('an object put', put))]
+    kinds = {'every frame set by itself': list(whole[1:]), 'no change': still,
+             'an object taken': taken, 'an object put': put}
+    return [FollowingTime(what, float(np.median(times)), max(times),
+                          alone / float(np.median(times))) for what, times in kinds.items()]
 
 
-def _timed(work: Callable[[], Scene]) -> tuple[Scene, float]:
+def _timed(work: Callable[[], T]) -> tuple[T, float]:
     start = now()
     result = work()
     return result, now() - start

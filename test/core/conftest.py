@@ -83,7 +83,8 @@ def observed(meshes, cameras=None):
 @pytest.fixture(scope='session')
 def small():
     """Return the functions above: importlib mode lets test modules share nothing else."""
-    return SimpleNamespace(box=box, rig=rig, views_of=views_of, observed=observed)
+    return SimpleNamespace(box=box, rig=rig, views_of=views_of, observed=observed,
+                           probabilities_of=probabilities_of)
 
 
 THINGS = {'box': trimesh.creation.box((0.14, 0.10, 0.06)),
@@ -91,11 +92,12 @@ THINGS = {'box': trimesh.creation.box((0.14, 0.10, 0.06)),
           'can': trimesh.creation.cylinder(0.03, 0.12, sections=32)}
 
 
-def desk_with(models, truth, seed=0):
+def desk_with(models, truth, seed=0, extra=()):
     """
     Return a desk with the objects `truth` (Candidates), seen by three small noisy cameras.
 
-    The depth has 1 mm of noise, 1 % of holes and whole millimetres. Fields: models (class ids
+    `extra` are further meshes, of no class. The depth has 1 mm of noise, 1 % of holes and whole
+    millimetres. Fields: models (class ids
     1 box, 2 ball, 3 can), cameras, truth, meshes (posed), clean (depth, inf = none), classes
     ((H, W), 0 none) and views (raw DepthView) of each camera, observation, probabilities
     (from the true classes, sure but not certain), and the frame that holds both.
@@ -106,11 +108,12 @@ def desk_with(models, truth, seed=0):
     meshes = [(posed_vertices(shape, truth.translation[i], truth.rotation_xyzw[i],
                               truth.size[i]), shape.faces)
               for i, shape in enumerate(truth.shapes(models))]
+    category = np.append(truth.category, np.zeros(len(extra) + 1, np.uint16))
     clean, classes, views = [], [], []
     for c in cameras:
-        depth, ids = render_depth([*meshes, table()], c)
+        depth, ids = render_depth([*meshes, *extra, table()], c)
         clean.append(depth)
-        classes.append(np.append(truth.category, 0)[np.maximum(ids, -1)] * (ids >= 0))
+        classes.append(category[np.maximum(ids, -1)] * (ids >= 0))
         noisy = np.round(depth + rng.normal(0, 0.001, depth.shape), 3)
         noisy[~np.isfinite(depth) | (rng.random(depth.shape) < 0.01)] = np.nan
         views.append(DepthView(c, noisy.astype(np.float32)))
@@ -160,7 +163,7 @@ def empty_desk(things):
 @pytest.fixture(scope='session')
 def make_desk(things):
     """Return a function: Candidates -> desk with them, of the things or of other models."""
-    return lambda truth, seed=0, models=things: desk_with(models, truth, seed)
+    return lambda truth, seed=0, models=things, extra=(): desk_with(models, truth, seed, extra)
 
 
 @pytest.fixture(scope='session')

@@ -15,7 +15,7 @@ from hooc_perception.errors import HoocError
 
 if TYPE_CHECKING:
     from hooc_perception.benchmark.chain import ChainTimes
-    from hooc_perception.benchmark.live import LiveTime
+    from hooc_perception.benchmark.live import FollowingTime
     from hooc_perception.benchmark.measure import Contest, Entry
     from hooc_perception.benchmark.scene import BenchScene
 
@@ -117,7 +117,7 @@ def _print(entries: Sequence['Entry'], quality: Mapping[str, float]) -> None:
                         tuple(notes))))
 
 
-def _print_live(times: Sequence['LiveTime']) -> None:
+def _print_live(times: Sequence['FollowingTime']) -> None:
     """Print the times of incremental parsing beside those of a parse."""
     from hooc_perception.evaluation.tables import Table, to_text
     rows = tuple((t.what, f'{t.seconds:.3f}', f'{t.slowest:.3f}', f'{t.ratio:.3g} x')

@@ -84,7 +84,7 @@ def observed(meshes, cameras=None):
 def small():
     """Return the functions above: importlib mode lets test modules share nothing else."""
     return SimpleNamespace(box=box, rig=rig, views_of=views_of, observed=observed,
-                           probabilities_of=probabilities_of)
+                           probabilities_of=probabilities_of, desk_with=desk_with)
 
 
 THINGS = {'box': trimesh.creation.box((0.14, 0.10, 0.06)),
@@ -97,10 +97,10 @@ def desk_with(models, truth, seed=0, extra=()):
     Return a desk with the objects `truth` (Candidates), seen by three small noisy cameras.
 
     `extra` are further meshes, of no class. The depth has 1 mm of noise, 1 % of holes and whole
-    millimetres. Fields: models (class ids
-    1 box, 2 ball, 3 can), cameras, truth, meshes (posed), clean (depth, inf = none), classes
-    ((H, W), 0 none) and views (raw DepthView) of each camera, observation, probabilities
-    (from the true classes, sure but not certain), and the frame that holds both.
+    millimetres. Fields: models (class ids 1 box, 2 ball, 3 can), cameras, truth, meshes (posed),
+    clean (depth, inf = none), classes ((H, W), 0 none) and views (raw DepthView) of each camera,
+    observation, probabilities (from the true classes, sure but not certain), and the frame that
+    holds both.
     """
     rng = np.random.default_rng(seed)
     cameras = tuple(camera(f'camera{i}', 0.3 + 2 * np.pi * i / 3, 0.75, 0.75, height=120,

@@ -37,13 +37,13 @@ class Runner:
 
 
 def bags(*names):
-    return [SimpleNamespace(name=name) for name in names]
+    return [SimpleNamespace(name=name, path=name, info={'sequence': None}) for name in names]
 
 
 def test_a_scene_that_fails_ends_with_itself():
     runner = Runner(failing=('b',))
     answers, failures = command.play_all(runner, bags('a', 'b', 'c'))
-    assert answers == {'a': 'answer to a', 'c': 'answer to c'}
+    assert answers == {'a': ['answer to a'], 'c': ['answer to c']}
     assert list(failures) == ['b'] and runner.starts == 1
 
 
@@ -55,6 +55,16 @@ def test_without_nodes_the_rest_is_not_played():
     assert 'parsing_node ended unexpectedly' in str(failures['c'])
 
 
+def test_all_frame_sets_of_a_sequence_are_answered_or_it_fails():
+    runner, (bag,) = Runner(), bags('a')
+    bag.info = {'sequence': {'frame_sets': {'a_0': None, 'a_1': None}}}
+    runner.results = ['first', 'second']
+    assert command.results_of(runner, bag) == ['first', 'second']
+    runner.results = ['first']
+    with pytest.raises(HoocError, match='a: 1 of the 2 frame sets of the sequence'):
+        command.results_of(runner, bag)
+
+
 @pytest.fixture
 def answer():
     """Return an Answer of the bundled scene in which nothing stands."""
@@ -62,14 +72,15 @@ def answer():
     parsed = ParsedScene(Candidates.empty(), Energy(0.5, 0.2, 0.0), none, none, none, none,
                          Candidates.empty())
     images = {camera.name: 0 for camera in BagScene(BAG).cameras}
-    return SimpleNamespace(parsed=parsed, seconds=1.0, images=images, probabilities=None)
+    return SimpleNamespace(parsed=parsed, seconds=1.0, images=images, probabilities=None,
+                           ids=np.zeros(0, np.uint32))
 
 
 @pytest.mark.skipif(not (BAG / 'metadata.yaml').is_file(), reason='no bundled scene')
 def test_the_finished_scenes_are_written_and_the_others_named(
         tmp_path, monkeypatch, capsys, answer):
     monkeypatch.setattr(command, 'play', lambda bags, args, model: (
-        {bags[0].name: answer}, {'other': HoocError('it is too hard')}, 'best', 0))
+        {bags[0].name: [answer]}, {'other': HoocError('it is too hard')}, 'best', 0))
     out = tmp_path / 'out' / 'r.json'
     assert main(['run', str(BAG), '--model', str(MODEL), '--out', str(out)]) == 1
     assert capsys.readouterr().err.splitlines()[-1] == 'hooc: scene other: it is too hard'

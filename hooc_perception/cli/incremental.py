@@ -4,7 +4,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 import time
-from typing import Any, TYPE_CHECKING
+from typing import Any, TYPE_CHECKING, TypeVar
 
 from hooc_perception.errors import HoocError
 from hooc_perception.scene import Scene
@@ -15,8 +15,18 @@ if TYPE_CHECKING:
     from hooc_perception.io.scenes.sequences import RecordedSequence
     from hooc_perception.parser import Parser
 
+Recorded = TypeVar('Recorded', bound='RecordedScene | BagScene')
 # Where nothing says how far apart frame sets are.
 PERIOD_S = 0.1
+
+
+def in_time_order(scenes: 'Sequence[Recorded]', sequences: 'Sequence[RecordedSequence]',
+                  ) -> 'list[Recorded]':
+    """Return scenes sequence by sequence, as they follow in time, then those of none."""
+    by_name = {scene.name: scene for scene in scenes}
+    names = [name for sequence in sequences for name in sequence.scenes]
+    return [*(by_name[name] for name in names),
+            *(scene for scene in scenes if scene.name not in names)]
 
 
 def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagScene]',
@@ -28,6 +38,7 @@ def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagSc
     A frame set that cannot be parsed is left out of its sequence. Scenes that no sequence names
     are one sequence.
 
+    :param scenes: see `in_time_order`.
     :param read: per scene (DepthViews, anything), or the HoocError that reading gave.
     """
     from hooc_perception.core.parsing.tracking import Tracker

@@ -42,7 +42,7 @@ def run(args: Namespace) -> int | None:
     """Parse every scene, write the results of those that could be; return the exit code."""
     from hooc_perception.cli.categories import category_gap, warn_of_gap
     from hooc_perception.cli.failures import tell_failures
-    from hooc_perception.cli.incremental import updates
+    from hooc_perception.cli.incremental import in_time_order, updates
     from hooc_perception.cli.overrides import overrides_of
     from hooc_perception.cli.places import file_place
     from hooc_perception.cli.sources import load_source, provenance
@@ -62,7 +62,9 @@ def run(args: Namespace) -> int | None:
                          max_instances=scene_set.max_instances, sigmas=args.sigmas)
     seed = folder.seed if args.seed is None else args.seed
     selected = scene_set.selected(args.scene)
-    scenes = selected.scenes
+    scenes: Sequence[Any] = selected.scenes
+    if args.incremental:
+        scenes = in_time_order(scenes, selected.sequences)
     if args.incremental and (args.true_poses or args.executor != 'local'):
         raise HoocError('--incremental parses one frame set after the other; leave out '
                         + ('--true-poses' if args.true_poses else '--executor'))

@@ -112,7 +112,12 @@ class Parser:
         """
         lap = _Laps()
         observation = lap('observe', self.observe(views))
-        return self._scene(self._whole(observation, lap, seed, change_pool), observation, lap)
+        frame = self.frame(observation, lap('classify', self.classify(observation)))
+        pool = lap('propose', self.propose(frame, seed))
+        if change_pool is not None:
+            T = observation.T_target_table
+            pool = change_pool(pool.moved(T)).moved(None if T is None else inverse(T))
+        return self._scene(self.decide(frame, pool, seed), observation, lap)
 
     def update(self, views: Sequence[DepthView], previous: Scene | None = None, seed: int = 0,
                full: bool = False) -> Scene:
@@ -174,16 +179,6 @@ class Parser:
         assert region is not None
         return self._finished(seen, self.method.revise(
             seen, before, region, seed, self.max_instances, full or step.settled, extra), seed)
-
-    def _whole(self, observation: Observation, lap: '_Laps', seed: int,
-               change_pool: Callable[[Candidates], Candidates] | None = None) -> ParsedScene:
-        """Return the ParsedScene of an observation by itself, in the table frame."""
-        frame = self.frame(observation, lap('classify', self.classify(observation)))
-        pool = lap('propose', self.propose(frame, seed))
-        if change_pool is not None:
-            T = observation.T_target_table
-            pool = change_pool(pool.moved(T)).moved(None if T is None else inverse(T))
-        return self.decide(frame, pool, seed)
 
     def _scene(self, parsed: ParsedScene, observation: Observation, lap: '_Laps') -> Scene:
         """Return the Scene in the target frame."""

@@ -3,6 +3,7 @@
 """`hooc parse --incremental`: the frame sets of a sequence, each after the one before."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
 import time
 from typing import Any, TYPE_CHECKING, TypeVar
 
@@ -16,8 +17,6 @@ if TYPE_CHECKING:
     from hooc_perception.parser import Parser
 
 Recorded = TypeVar('Recorded', bound='RecordedScene | BagScene')
-# Where nothing says how far apart frame sets are.
-PERIOD_S = 0.1
 
 
 def in_time_order(scenes: 'Sequence[Recorded]', sequences: 'Sequence[RecordedSequence]',
@@ -43,25 +42,24 @@ def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagSc
     """
     from hooc_perception.core.parsing.tracking import Tracker
     from hooc_perception.io.scenes.results import with_ids
+    from hooc_perception.io.scenes.sequences import PERIOD_S
     of_scene = {name: sequence for sequence in sequences for name in sequence.scenes}
-    tracker, current, number = Tracker(parser.models), None, 0
-    previous: Scene | None = None
-    for scene, given in zip(scenes, read):
-        sequence = of_scene.get(scene.name)
-        if number == 0 or sequence is not current:
-            tracker, previous, current, number = Tracker(parser.models), None, sequence, 0
-        stamp_ns = round(number * (PERIOD_S if sequence is None else sequence.period_s) * 1e9)
-        number += 1
-        if isinstance(given, HoocError):
-            yield given, float('nan')
-            continue
-        start = time.monotonic()
-        try:
-            result = parser.update(given[0], previous, seed)
-        except HoocError as error:
-            yield error, float('nan')
-            continue
-        previous, seconds = result, time.monotonic() - start
-        ids, _ = tracker.update(stamp_ns, result.parsed.objects)
-        unknown_ids = tracker.update_unknown(stamp_ns, result.parsed.unknown)
-        yield with_ids(result.to_dict(), ids, unknown_ids), seconds
+    for sequence, frame_sets in groupby(zip(scenes, read), lambda one: of_scene.get(one[0].name)):
+        period_s = PERIOD_S if sequence is None else sequence.period_s
+        tracker = Tracker(parser.models)
+        previous: Scene | None = None
+        for number, (_, given) in enumerate(frame_sets):
+            if isinstance(given, HoocError):
+                yield given, float('nan')
+                continue
+            start = time.monotonic()
+            try:
+                result = parser.update(given[0], previous, seed)
+            except HoocError as error:
+                yield error, float('nan')
+                continue
+            previous, seconds = result, time.monotonic() - start
+            stamp_ns = round(number * period_s * 1e9)
+            ids, _ = tracker.update(stamp_ns, result.parsed.objects)
+            unknown_ids = tracker.update_unknown(stamp_ns, result.parsed.unknown)
+            yield with_ids(result.to_dict(), ids, unknown_ids), seconds

@@ -64,10 +64,10 @@ def run(args: Namespace) -> int | None:
     selected = scene_set.selected(args.scene)
     scenes: Sequence[Any] = selected.scenes
     if args.incremental:
+        if args.true_poses or args.executor != 'local':
+            raise HoocError('--incremental parses one frame set after the other; leave out '
+                            + ('--true-poses' if args.true_poses else '--executor'))
         scenes = in_time_order(scenes, selected.sequences)
-    if args.incremental and (args.true_poses or args.executor != 'local'):
-        raise HoocError('--incremental parses one frame set after the other; leave out '
-                        + ('--true-poses' if args.true_poses else '--executor'))
     if args.true_poses:
         _check_true_poses(scenes, names, category_gap(names, scene_set.category_names, args.set))
     else:

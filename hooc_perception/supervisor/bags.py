@@ -9,6 +9,7 @@ import sys
 from typing import Any, TypeVar
 
 from hooc_perception.chain import CHAIN, INGESTION, PARSING, REPLAY
+from hooc_perception.core.parsing.tracking import TrackConfig
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.reader import BagScene
 from hooc_perception.supervisor.collector import Collector, FrameSetResult
@@ -18,8 +19,6 @@ from hooc_perception.supervisor.supervisor import Supervisor
 MATCH_TIMEOUT_S = 30.0
 # Subscribers of every image: ingestion and the collector, and the recorder if there is one.
 SUBSCRIBERS = 2
-# Objects of a sequence keep their ids while they are out of sight.
-TRACK_TTL_S = 30.0
 # If all nodes are idle for this many seconds without a result, the frame set was lost.
 LOST_AFTER_S = 8
 T = TypeVar('T')
@@ -44,9 +43,9 @@ class BagRunner:
         self._supervisor, self._timeout_s = supervisor, timeout_s
         self._record = None if record is None else Path(record)
         self._collector = Collector(supervisor.node)
-        # (parameters of the rig, max_instances) that the chain is configured for.
-        self._rig: tuple[dict[str, Any], int] | None = None
-        self._is_up = False
+        # (parameters of the rig, max_instances, whether it is a sequence) that the chain is
+        # configured for.
+        self._rig: tuple[dict[str, Any], int, bool] | None = None
 
     @property
     def results(self) -> list[FrameSetResult]:
@@ -101,7 +100,7 @@ class BagRunner:
 
     def start_over(self) -> None:
         """Bring all nodes down after a scene that failed; HoocError if one has died."""
-        self._rig, self._is_up = None, False
+        self._rig = None
         self._supervisor.bring_down()
 
     def _collect(self, bag: BagScene, began: int) -> FrameSetResult:
@@ -149,20 +148,20 @@ class BagRunner:
                'target_frame': info['world_frame'] or 'table'}
         limit, moving = info['max_instances'], info['sequence'] is not None
         # A sequence begins with nothing known; so does each bag without one, frame set by set.
-        if (rig, limit) == self._rig and not moving:
+        if (rig, limit, moving) == self._rig and not moving:
             return
-        if self._is_up:
+        if self._rig is not None:
             self._supervisor.bring_down(CHAIN)
-        self._is_up = True
         # A recorded frame set is complete, however long its images take.
+        ttl_s = TrackConfig().track_ttl_s if moving else 0.0
         own = {INGESTION: {'camera_timeout_s': 0.0, 'explain_after_s': 0.0},
-               PARSING: {'max_instances': limit, 'track_ttl_s': TRACK_TTL_S if moving else 0.0}}
+               PARSING: {'max_instances': limit, 'track_ttl_s': ttl_s}}
         for name in CHAIN:
             self._supervisor.set_parameters(
                 name, {**rig, 'wait_for_stages': True, 'incremental': moving,
                        **own.get(name, {})})
         self._supervisor.bring_up(CHAIN)
-        self._rig = None if moving else (rig, limit)
+        self._rig = rig, limit, moving
 
     def _wait(self, condition: Callable[[], T | None], began_ns: int, timeout_s: float,
               complaint: str | Callable[[], str]) -> T:

@@ -122,11 +122,7 @@ class Evidence:
 
     def unexplained(self, context: Context | None = None) -> Float64Array:
         """Return (n,) float64, the share of each cloud point's pixels that nothing explains."""
-        seen = self.row >= 0
-        cost = (context or self.nothing).cost[seen]
-        total = np.bincount(self.row[seen], minlength=self.n_points)
-        left = np.bincount(self.row[seen], weights=cost > UNEXPLAINED, minlength=self.n_points)
-        return left / np.maximum(total, 1)
+        return self._share_of_points((context or self.nothing).cost > UNEXPLAINED)
 
     def share_of_points(self, region: Sequence[BoolArray]) -> Float64Array:
         """
@@ -134,11 +130,14 @@ class Evidence:
 
         :param region: per view (H, W) bool.
         """
+        return self._share_of_points(_stacked(region, self.stride))
+
+    def _share_of_points(self, pixels: BoolArray) -> Float64Array:
+        """Return (n,) float64, the share of each cloud point's pixels that are True in (P,)."""
         seen = self.row >= 0
-        inside = _stacked(region, self.stride)[seen]
         total = np.bincount(self.row[seen], minlength=self.n_points)
-        return np.bincount(self.row[seen], weights=inside,
-                           minlength=self.n_points) / np.maximum(total, 1)
+        chosen = np.bincount(self.row[seen], weights=pixels[seen], minlength=self.n_points)
+        return chosen / np.maximum(total, 1)
 
     def share_of_lists(self, lists: PixelLists, region: Sequence[BoolArray]) -> Float64Array:
         """Return (m,) float64, the share of each list's pixels in a region, see above."""

@@ -13,6 +13,7 @@ from dataclasses import replace
 
 from hooc_perception.core.arrays import BoolArray, Float32Array
 from hooc_perception.core.incremental.kernels.windows import at_edges, compare_windows
+from hooc_perception.core.segment.foreground import large_parts
 from hooc_perception.core.types import Camera, Observation, ObservedView
 import numpy as np
 from scipy import ndimage
@@ -59,7 +60,7 @@ def changed_pixels(before: Float32Array, now: Float32Array, focal_px: float) -> 
         return changed
     # The mean of a window spreads over its border: what differs there belongs to the change.
     changed = np.asarray(ndimage.binary_dilation(changed, np.ones((3, 3), bool)), bool)
-    return _large(changed)
+    return large_parts(changed, FEWEST_CONNECTED_PX)
 
 
 def changes(before: Observation, now: Observation) -> tuple[BoolArray, ...]:
@@ -76,7 +77,7 @@ def changes(before: Observation, now: Observation) -> tuple[BoolArray, ...]:
     for a, b in zip(before.views, now.views):
         mask = changed_pixels(a.depth, b.depth, focal_px(b.camera))
         mask &= np.asarray(ndimage.binary_dilation(a.foreground | b.foreground), bool)
-        masks.append(_large(mask & ~unseen(a) & ~unseen(b)))
+        masks.append(large_parts(mask & ~unseen(a) & ~unseen(b), FEWEST_CONNECTED_PX))
     return tuple(masks)
 
 
@@ -126,14 +127,3 @@ def _same_view(before: ObservedView, now: ObservedView) -> bool:
         # A camera that sees no table is not levelled: it seems to have moved.
         b = replace(b, T_world_camera=a.T_world_camera)
     return same_camera(a, b)
-
-
-def _large(mask: BoolArray) -> BoolArray:
-    """Return the pixels (H, W) of connected parts that are no noise."""
-    if not mask.any():
-        return mask
-    labels = np.empty(mask.shape, np.int32)
-    ndimage.label(mask, np.ones((3, 3), int), output=labels)
-    sizes = np.bincount(labels.ravel())
-    sizes[0] = 0
-    return sizes[labels] >= FEWEST_CONNECTED_PX

@@ -107,24 +107,22 @@ def _labels(before: Float32Array, now: Float32Array, changed: BoolArray) -> Int3
 def _parts(k: int, view: RectifiedView, labels: Int32Array, config: ObserveConfig) -> list[_Part]:
     """Return the parts of one view that are large enough and not outside altogether."""
     parts = []
-    xyz = back_project(view.depth, view.camera)
+    xyz, reach_m = back_project(view.depth, view.camera), radius_m(config)
     counts = np.bincount(labels.ravel())
-    boxes = ndimage.find_objects(labels)
     borders = [np.flatnonzero(np.isfinite(view.depth).any(axis))[[0, -1]] for axis in (1, 0)]
-    for label in np.flatnonzero(counts >= FEWEST_PX):
-        box = boxes[label - 1] if label else None
-        if box is None:
+    for label, box in enumerate(ndimage.find_objects(labels), 1):
+        if counts[label] < FEWEST_PX:
             continue
         mine = labels[box] == label
         points = xyz[box][mine]
-        inside = ((np.hypot(points[:, 0], points[:, 1]) < radius_m(config))
+        inside = ((np.hypot(points[:, 0], points[:, 1]) < reach_m)
                   & (points[:, 2] < config.max_height_m))
         if inside.sum() < FEWEST_PX:
             continue
         cut = any(edge.start <= first + CUT_PX or edge.stop > last - CUT_PX
                   for edge, (first, last) in zip(box, borders))
         low, high = np.quantile(points, [0.02, 0.98], axis=0)
-        parts.append(_Part(k, int(label), points[::max(1, len(points) // MOST_POINTS)],
+        parts.append(_Part(k, label, points[::max(1, len(points) // MOST_POINTS)],
                            float(np.linalg.norm(high - low)),
                            cut or int((~inside).sum()) >= FEWEST_PX))
     return parts

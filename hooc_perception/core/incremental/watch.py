@@ -36,14 +36,12 @@ class Watched:
     :ivar accumulated: one per camera; None for a camera that has not shown anything yet.
     :ivar fresh: whether nothing was taken over from earlier frame sets.
     :ivar calm: how many frame sets in a row have shown no change.
-    :ivar T_target_table: of the observation.
     """
 
     observation: Observation
     accumulated: tuple[Accumulated | None, ...]
     fresh: bool = True
     calm: int = 0
-    T_target_table: Float64Array | None = None
 
 
 def watch(views: Sequence[RectifiedView], before: Watched | None,
@@ -66,7 +64,7 @@ def watch(views: Sequence[RectifiedView], before: Watched | None,
                 or not _is_other(before.observation, watched.observation, config)):
             return watched
     return Watched(observe(views, config, T_target_table),
-                   tuple(_first(view) for view in views), T_target_table=T_target_table)
+                   tuple(_first(view) for view in views))
 
 
 def seen_so_far(before: Observation, now: Observation) -> Observation:
@@ -109,14 +107,13 @@ def _next(views: Sequence[RectifiedView], before: Watched, config: ObserveConfig
     accumulates = config.accumulate
     if calm and calm != accumulates.settle_frames and calm % accumulates.accumulate_frames:
         return replace(before, accumulated=tuple(accumulated), calm=calm, fresh=False)
-    return Watched(observe(fused, config, T_target_table), tuple(accumulated), False, calm,
-                   T_target_table)
+    return Watched(observe(fused, config, T_target_table), tuple(accumulated), False, calm)
 
 
 def _is_still(views: Sequence[RectifiedView], before: Watched, changed: Sequence[BoolArray],
               aside: Sequence[BoolArray], T_target_table: Float64Array | None) -> bool:
     """Return whether a frame set shows what the last observation shows, with other noise."""
-    if not np.array_equal(_matrix(before.T_target_table), _matrix(T_target_table)):
+    if not np.array_equal(_matrix(before.observation.T_target_table), _matrix(T_target_table)):
         return False
     pixels = 0
     for seen, view, mask, away in zip(before.observation.views, views, changed, aside):

@@ -9,7 +9,13 @@ from hooc_perception.core.arrays import AnyArray, Float32Array, Int64Array, UInt
 from hooc_perception.core.geometry import posed_vertices
 from hooc_perception.core.parsing.tracking import TrackConfig
 from hooc_perception.core.render import render_patch
-from hooc_perception.core.types import GenericModel, Observation, ObservedView, ParsedScene
+from hooc_perception.core.types import (
+    Candidates,
+    GenericModel,
+    Observation,
+    ObservedView,
+    ParsedScene,
+)
 import numpy as np
 
 # An object is hidden if the robot covers at least this share of its pixels, over all views, ...
@@ -76,9 +82,7 @@ class HiddenObjects:
         seen_ns, objects = np.full(len(ids), stamp_ns, np.int64), parsed.objects
         for k, model in enumerate(objects.shapes(self.models)):
             before = np.flatnonzero(self._ids == ids[k])
-            vertices = posed_vertices(model, objects.translation[k], objects.rotation_xyzw[k],
-                                      objects.size[k])
-            if len(before) and _is_hidden(vertices, model, views, COVERED_SHARE):
+            if len(before) and _is_hidden(objects, k, model, views, COVERED_SHARE):
                 seen_ns[k] = self._seen_ns[before[0]]
         return seen_ns
 
@@ -95,9 +99,7 @@ class HiddenObjects:
                     or (self.max_instances and counts[category] >= self.max_instances)
                     or _is_taken(last.translation[k], last.size[k], parsed)):
                 continue
-            vertices = posed_vertices(model, last.translation[k], last.rotation_xyzw[k],
-                                      last.size[k])
-            if _is_hidden(vertices, model, views):
+            if _is_hidden(last, k, model, views, HIDDEN_SHARE):
                 kept.append(k)
                 counts[category] += 1
         return kept
@@ -110,9 +112,11 @@ def _is_taken(translation: AnyArray, size: AnyArray, parsed: ParsedScene) -> boo
     return bool((apart < 0.5 * longest).any())
 
 
-def _is_hidden(vertices: AnyArray, model: GenericModel, views: Sequence[ObservedView],
-               share: float = HIDDEN_SHARE) -> bool:
-    """Return whether a share of a posed mesh is hidden, and nobody sees through its place."""
+def _is_hidden(objects: Candidates, k: int, model: GenericModel, views: Sequence[ObservedView],
+               share: float) -> bool:
+    """Return whether a share of object `k` is hidden, and nobody sees through its place."""
+    vertices = posed_vertices(model, objects.translation[k], objects.rotation_xyzw[k],
+                              objects.size[k])
     total = hidden = through = 0
     for view in views:
         pixels, depth = render_patch(vertices, model.faces, view.camera)

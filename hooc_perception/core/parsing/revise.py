@@ -81,18 +81,17 @@ def with_held(parsed: ParsedScene, before: ParsedScene, held: BoolArray, of_befo
     :param held: (n,) bool, which objects of `parsed` were held; `of_before` (m,) bool, the same
         objects among those of `before`, in the same order.
     """
-    def kept(now: Float32Array, then: Float32Array | None) -> Float32Array | None:
-        if then is None:
-            return None
+    def kept(now: Float32Array, then: Float32Array) -> Float32Array:
         both = now.copy()
         both[held] = then[of_before]
         return both
 
     nothing = np.full(len(held), np.nan, np.float32)
+    sigma_t, sigma_r = (None if sigma is None else kept(nothing, sigma)
+                        for sigma in (before.sigma_t, before.sigma_r))
     score = kept(parsed.objects.score, before.objects.score)
-    assert score is not None
-    return replace(parsed, objects=replace(parsed.objects, score=score),
-                   sigma_t=kept(nothing, before.sigma_t), sigma_r=kept(nothing, before.sigma_r))
+    return replace(parsed, objects=replace(parsed.objects, score=score), sigma_t=sigma_t,
+                   sigma_r=sigma_r)
 
 
 def _share(frame: Frame, objects: Candidates, region: Sequence[BoolArray], config: ParseConfig,

@@ -85,7 +85,7 @@ def against_table(camera: Camera, depth: Float32Array, sigma_m: float, config: O
         above |= height - base > _threshold(local_sigma, config)
     foreground = seen & near & above & (height < config.max_height_m)
     foreground = allowed(points, foreground)
-    foreground &= ~_tiny(foreground)
+    foreground = large_parts(foreground, FEWEST_PIXELS)
     return _with_background(camera, depth, foreground, table, plane)
 
 
@@ -136,8 +136,12 @@ def _opened(mask: BoolArray) -> BoolArray:
     return np.asarray(ndimage.binary_opening(mask, np.ones((3, 3), bool)), bool)
 
 
-def _tiny(mask: BoolArray) -> BoolArray:
-    """Return the pixels of connected parts that are too small to be real."""
+def large_parts(mask: BoolArray, fewest_px: int) -> BoolArray:
+    """Return the pixels (H, W) of connected parts of so many pixels; smaller ones are noise."""
+    if not mask.any():
+        return mask
     labels = np.empty(mask.shape, np.int32)
     ndimage.label(mask, np.ones((3, 3), int), output=labels)
-    return np.bincount(labels.ravel())[labels] < FEWEST_PIXELS
+    sizes = np.bincount(labels.ravel())
+    sizes[0] = 0
+    return sizes[labels] >= fewest_px

@@ -171,3 +171,16 @@ def test_categories_have_colours_of_their_own():
     rgb = np.array(list(palette.values()), float)
     gap = np.linalg.norm(rgb[:, None] - rgb[None], axis=-1) + 999 * np.eye(25)
     assert gap.min() > 12
+
+
+def test_things_of_no_category_are_no_false_categories(tiny, models, truth_results):
+    entry, scene = truth_results['scenes'][0], tiny.scene('10_1')
+    unknown = {'unknown': [{'score': 0.5, 'translation': [0.2, 0.1, 0.05],
+                            'rotation_xyzw': [0, 0, 0, 1], 'size': [0.1, 0.2, 0.1]}]}
+    alone, beside = (' '.join(' '.join(Page(report_html([report_scene(
+        entry | more, scene.depth(), models, scene.truth)], 'x')).text).split())
+        for more in ({}, unknown))
+    n = len(entry['objects'])
+    for text in (alone, beside):
+        assert 'false categories 0' in text and f'{n} object' in text
+    assert '1 of no category' in beside and 'of no category' not in alone

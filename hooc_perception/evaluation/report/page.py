@@ -80,7 +80,8 @@ def _scene(index: int, scene: ReportScene, palette: Palette, store: Meshes) -> d
         'found': sum(s.estimate is not None for s in scores),
         'localized': sum(s.localized for s in scores),
         'tight': sum(bool(s.tight) for s in scores),
-        'false': len({o.category for o in scene.objects}
+        'estimated': len(scene.known), 'unknown': len(scene.objects) - len(scene.known),
+        'false': len({o.category for o in scene.known}
                      - {t.category for t in scene.truth}) if scene.truth is not None else None,
         'rejected': rejected_rows(scene, palette), 'candidates': len(scene.pool),
         'space': Markup(space.json(rows, store)), 'still': pictures.data_uri(space.still()),

@@ -66,13 +66,17 @@ class ReportScene:
     converged: bool = True
 
     @property
+    def known(self) -> list[PosedObject]:
+        """Return the estimated objects without the things of no category."""
+        return [o for o in self.objects if o.category != UNKNOWN]
+
+    @property
     def scores(self) -> list[ObjectScore] | None:
         """Return [ObjectScore] in the order of the truth, None without truth."""
         if self.truth is None:
             return None
         # Things of no category come last: the places of the others stay.
-        known = [o for o in self.objects if o.category != UNKNOWN]
-        return score_objects(known, self.truth, self.models)
+        return score_objects(self.known, self.truth, self.models)
 
     @property
     def rejected(self) -> list[PosedObject]:

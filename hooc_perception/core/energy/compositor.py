@@ -39,6 +39,7 @@ from hooc_perception.core.arrays import (
 from hooc_perception.core.energy.kernels import compositor as kernels
 from hooc_perception.core.energy.kernels.compositor import Lists, Runs
 from hooc_perception.errors import HoocError
+import numba as nb
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -71,20 +72,17 @@ class Compositor:
         unary = np.zeros(n) if unary is None else np.asarray(unary, np.float64)
         _check(offsets, pixel, depth, cost, cost_none, unary)
         greatest = max((np.abs(a).max() for a in (cost, cost_none) if len(a)), default=0.0)
-        quantum = 2.0 ** (np.ceil(np.log2(max(greatest, 1e-30))) - COST_BITS)
-
-        def rounded(costs: Float64Array) -> Float64Array:
-            return np.round(costs / quantum) * quantum
-
+        self._quantum = 2.0 ** (np.ceil(np.log2(max(greatest, 1e-30))) - COST_BITS)
         # Pixels that no candidate covers cost the same whatever is chosen: summed once.
         seen = np.bincount(pixel, minlength=len(cost_none)) > 0
         self.pixels: Int64Array = np.flatnonzero(seen)
-        cost_none = rounded(cost_none)
+        cost_none = self._rounded(cost_none)
         self._unseen = float(cost_none[~seen].sum())
-        self._unary = rounded(unary)
+        self._unary = self._rounded(unary)
         owner, slot_cost, self._run, self._entry = kernels.build(
             offsets, (np.cumsum(seen) - 1)[pixel].astype(np.int32), depth,
-            rounded(cost).astype(np.float32), cost_none[self.pixels].astype(np.float32))
+            self._rounded(cost).astype(np.float32), cost_none[self.pixels].astype(np.float32),
+            nb.get_num_threads())
         self._kind, self._lists, self._runs = _merged(self._run, owner, slot_cost, n)
         n_kinds = len(self._runs[2]) - 1
         self._group: Int64Array = (np.zeros(n, np.int64) if group is None
@@ -142,6 +140,14 @@ class Compositor:
         self._count[self._group[k]] += 1 if joins else -1
         (kernels.add if joins else kernels.remove)(
             k, self._lists, self._runs, self._active, self._first, self._second, self._deltas)
+
+    def reprice(self, unary: Float64Array) -> None:
+        """Replace the unary cost (n,) of each candidate; the subset stays."""
+        self._unary = self._rounded(unary)
+        self._unary_cost = float(self._unary[self._active[:self.n]].sum())
+
+    def _rounded(self, costs: Float64Array) -> Float64Array:
+        return np.round(costs / self._quantum) * self._quantum
 
     def evaluate(self, mask: BoolArray) -> float:
         """Return the energy of the subset `mask` (n,) bool; the current one stays."""

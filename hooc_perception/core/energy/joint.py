@@ -42,17 +42,24 @@ class JointEnergy(ImagesAndVolumes):
         if self.n:
             extents = np.array([shape.extents for shape in pool.shapes(models)])
             prior = (np.log(pool.size / np.maximum(extents, 1e-9)) ** 2).sum(1)
-        scale = evidence.scale
-        base = costs.base_cost if penalty is None else penalty
-        unary = base * scale + stats[:, stat.SHOWN] * (costs.complexity
-                                                       + costs.size_prior * prior)
+        self._costs, self._scale = costs, evidence.scale
+        self._area_cost = stats[:, stat.SHOWN] * (costs.complexity + costs.size_prior * prior)
         # A volume need not be known better than the pixels.
-        overlap = OverlapTerm(pool, models, 256 if scale == 1 else 128)
+        overlap = OverlapTerm(pool, models, 256 if evidence.scale == 1 else 128)
         super().__init__(
             Compositor(lists.offsets, lists.pixel, lists.depth, lists.cost,
-                       evidence.cost_none.astype(np.float64), unary=unary,
+                       evidence.cost_none.astype(np.float64), unary=self._unary(penalty),
                        group=pool.category, max_per_group=max_instances), overlap)
-        self._weight = costs.overlap * scale
+        self._weight = costs.overlap * self._scale
+
+    def _unary(self, penalty: Float64Array | None) -> Float64Array:
+        """Return (n,) what each candidate costs by itself."""
+        base = self._costs.base_cost if penalty is None else penalty
+        return base * self._scale + self._area_cost
+
+    def reprice(self, penalty: Float64Array | None) -> None:
+        """Replace the cost (n,) of each object, as in the constructor; the subset stays."""
+        self._images.reprice(self._unary(penalty))
 
     @property
     def value(self) -> float:

@@ -155,11 +155,21 @@ def best_swap(energy: SearchableEnergy, stop: Stop | None = None) -> bool:
 
 
 def descend(energy: SearchableEnergy, config: LocalSearchConfig = LocalSearchConfig(),
-            stop: Stop | None = None) -> None:
-    """Flip and swap until no flip and no swap lowers the energy."""
+            stop: Stop | None = None, optima: set[bytes] | None = None) -> None:
+    """
+    Flip and swap until no flip and no swap lowers the energy.
+
+    :param optima: subsets of this energy from which no swap leads on; those that are reached are
+        added, and not tried again.
+    """
+    optima = set() if optima is None else optima
     while True:
         greedy(energy, stop)
-        if not config.swaps or not best_swap(energy, stop):
+        reached = energy.mask.tobytes()
+        if not config.swaps or reached in optima:
+            return
+        if not best_swap(energy, stop):
+            optima.add(reached)
             return
 
 
@@ -179,14 +189,15 @@ def local_search(energy: SearchableEnergy, rng: np.random.Generator,
     best_value, best_mask = energy.value, energy.mask
     calm = kicks = 0
     converged = True
+    optima: set[bytes] = set()
     try:
-        descend(energy, config, stop)
+        descend(energy, config, stop, optima)
         best_value, best_mask = energy.value, energy.mask
         while calm < config.patience and energy.n:
             calm += 1
             kicks += 1
             _kick(energy, rng, config.kick)
-            descend(energy, config, stop)
+            descend(energy, config, stop, optima)
             if energy.value < best_value - TINY:
                 calm = 0
             if energy.value <= best_value + TINY:

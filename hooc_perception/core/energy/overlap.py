@@ -15,12 +15,7 @@ category has to be left out (the paper left out dustpan and tray).
 
 from collections.abc import Sequence
 
-from hooc_perception.core.arrays import (
-    BoolArray,
-    Float64Array,
-    Int32Array,
-    UInt64Array,
-)
+from hooc_perception.core.arrays import BoolArray, Float64Array, Int64Array
 from hooc_perception.core.energy.kernels import overlap as kernels
 from hooc_perception.core.memo import per_model
 from hooc_perception.core.types import Candidates, GenericModel
@@ -30,6 +25,8 @@ from scipy.spatial.transform import Rotation
 
 SAMPLES = 512
 CELLS = 48
+# Objects for whose comparisons room is made at first.
+LEAST_ROWS = 32
 # A mesh whose winding grid holds less than this share of its interior points is not closed.
 BELIEVABLE = 0.75
 
@@ -81,7 +78,8 @@ class OverlapTerm:
     The sum of v_k over the objects of a subset, kept up to date flip by flip.
 
     It has the interface that a search needs (see compositor.py). `value` and `deltas()` are in
-    shares of a volume, so its weighted sum with a Compositor is again an energy.
+    shares of a volume, so its weighted sum with a Compositor is again an energy. An object is
+    compared with all others when it is first chosen: most of a pool never is.
 
     :param objects: Candidates; class id c is models[c - 1].
     :param count: samples of each interior, a multiple of 64.
@@ -89,33 +87,20 @@ class OverlapTerm:
 
     def __init__(self, objects: Candidates, models: Sequence[GenericModel],
                  count: int = SAMPLES) -> None:
-        """Compare all pairs whose bounding boxes meet; start from the empty subset."""
+        """Start from the empty subset."""
         self.n = n = len(objects)
-        self._count = count
+        self._count, words = count, count // 64
+        self._poses, self._solids = _poses_and_solids(objects, models, count)
         self._active = np.zeros(n, bool)
-        kinds, row = np.unique(np.column_stack([objects.category, objects.member]), axis=0,
-                               return_inverse=True)
-        samples = np.zeros((len(kinds), count, 3))
-        grids = np.zeros((len(kinds), CELLS, CELLS, CELLS), bool)
-        for i, (c, member) in enumerate(kinds):
-            shape = models[c - 1].members[member]
-            samples[i], grids[i] = interior_samples(shape, count), occupancy(shape)
-        R = (Rotation.from_quat(objects.rotation_xyzw).as_matrix() if n
-             else np.zeros((0, 3, 3)))
-        size = np.maximum(objects.size.astype(np.float64), 1e-9)
-        pairs = _meeting_pairs(R, objects.translation, size)
-        bits = np.zeros((len(pairs), count // 64), np.uint64)
-        kernels.sample_bits(pairs, row.reshape(-1).astype(np.int32), R, objects.translation, size,
-                            samples, grids, bits)
-        # Keep pairs with a common volume, both directions, ordered by the first.
-        mirror = np.lexsort((pairs[:, 0], pairs[:, 1]))
-        kept = bits.any(1) | bits[mirror].any(1)
-        self._other: Int32Array = pairs[kept, 1]
-        self._bits: UInt64Array = bits[kept]
-        self._start = np.searchsorted(pairs[kept, 0], np.arange(n + 1))
-        self._reverse = np.lexsort((pairs[kept, 0], pairs[kept, 1]))
-        self._union, self._once = np.zeros((2, n, count // 64), np.uint64)
-        self.reset(self._active)
+        self._row = np.full(n, -1)
+        # Of compared objects, with all: see kernels.compare. More rows are added as needed.
+        self._meets = np.zeros((0, n), bool)
+        self._inside, self._around = np.zeros((2, 0, n, words), np.uint64)
+        self._compared = 0
+        self._union, self._once = np.zeros((2, n, words), np.uint64)
+        self._deltas = np.zeros(n, np.int64)
+        self._chosen = np.zeros(0, np.int64)
+        self._covered: int | np.int64 = 0
 
     @property
     def mask(self) -> BoolArray:
@@ -130,56 +115,81 @@ class OverlapTerm:
     def reset(self, mask: BoolArray) -> None:
         """Start again from the subset `mask` (n,) bool."""
         self._active[:] = mask
-        self._covered: int | np.int64 = kernels.cover_all(self._start, self._other, self._bits,
-                                               self._active, self._union, self._once)
+        self._chosen = np.flatnonzero(self._active)
+        rows = self._rows_of(self._chosen)
+        self._covered = kernels.restart(self._chosen, rows, self._active, self._meets,
+                                        self._inside, self._around, self._union, self._once,
+                                        self._deltas)
 
     def deltas(self) -> Float64Array:
         """Return (n,) float64: the change of `value` by each flip."""
-        deltas = np.zeros(self.n, np.int64)
-        kernels.flip_deltas(self._start, self._other, self._reverse, self._bits, self._active,
-                            self._union, self._once, deltas)
-        return deltas / self._count
+        return self._deltas / self._count
 
     def flip(self, k: int) -> None:
         """Let object k join the subset, or leave it if it is in."""
-        self._covered = self._covered + kernels.flip_delta(
-            k, self._start, self._other, self._reverse, self._bits, self._active, self._union,
-            self._once)
-        kernels.flip(k, self._start, self._other, self._bits, self._active, self._union,
-                     self._once)
+        self._covered = self._covered + self._deltas[k]
+        self._active[k] = not self._active[k]
+        self._chosen = np.flatnonzero(self._active)
+        if self._row[k] < 0:
+            self._compare(np.array([k]))
+        kernels.update(k, int(self._row[k]), self._chosen, self._row[self._chosen], self._active,
+                       self._meets, self._inside, self._around, self._union, self._once,
+                       self._deltas)
 
     def shares(self, mask: BoolArray) -> Float64Array:
         """Return (m,) float64: v_k of each member of the subset `mask` (n,) bool."""
         members = np.flatnonzero(mask)
         counts = np.zeros(len(members), np.int64)
-        kernels.covered(members, np.asarray(mask, bool), self._start, self._other, self._bits,
-                        counts)
+        rows = self._rows_of(members)
+        kernels.covered(members, rows, self._meets, self._around, counts)
         return counts / self._count
 
     def pairwise(self) -> Float64Array:
         """Return (n, n) float64: share of the volume of row k inside object j, subset or not."""
-        shares = np.zeros((self.n, self.n))
-        for k in range(self.n):
-            run = slice(self._start[k], self._start[k + 1])
-            bits = np.unpackbits(self._bits[run].view(np.uint8), axis=1)
-            shares[k, self._other[run]] = bits.sum(1) / self._count
-        return shares
+        rows = self._rows_of(np.arange(self.n))
+        bits = np.unpackbits(self._inside[rows].view(np.uint8), axis=2)
+        return bits.sum(2) / self._count
 
     def evaluate(self, mask: BoolArray) -> float:
         """Return the sum of v_k over the subset `mask` (n,) bool; the current one stays."""
         return float(self.shares(mask).sum())
 
+    def _rows_of(self, objects: Int64Array) -> Int64Array:
+        """Return the rows (m,) of objects (m,), which are compared now if they were not yet."""
+        new = objects[self._row[objects] < 0]
+        if len(new):
+            self._compare(new)
+        return self._row[objects]
 
-def _meeting_pairs(R: Float64Array, translation: Float64Array,
-                   size: Float64Array) -> Int32Array:
-    """Return (m, 2) int32 ordered pairs, both directions, whose world boxes and spheres meet."""
+    def _compare(self, new: Int64Array) -> None:
+        """Compare objects (m,), none of which was compared before, with all."""
+        first, last = self._compared, self._compared + len(new)
+        if last > len(self._meets):
+            more = max(last, 2 * len(self._meets), LEAST_ROWS) - len(self._meets)
+            self._meets, self._inside, self._around = (
+                np.concatenate([rows, np.zeros((more, *rows.shape[1:]), rows.dtype)])
+                for rows in (self._meets, self._inside, self._around))
+        self._row[new], self._compared = np.arange(first, last), last
+        kernels.compare(new, self._poses, self._solids, self._meets[first:last],
+                        self._inside[first:last], self._around[first:last])
+
+
+def _poses_and_solids(objects: Candidates, models: Sequence[GenericModel], count: int,
+                      ) -> tuple[kernels.Poses, kernels.Solids]:
+    """Return what the kernels take of objects and the models that they use."""
+    kinds, row = np.unique(np.column_stack([objects.category, objects.member]), axis=0,
+                           return_inverse=True)
+    shapes = [models[c - 1].members[member] for c, member in kinds]
+    samples = [interior_samples(shape, count) for shape in shapes]
+    grids = [occupancy(shape) for shape in shapes]
+    R = (Rotation.from_quat(objects.rotation_xyzw).as_matrix() if len(objects)
+         else np.zeros((0, 3, 3)))
+    size = np.maximum(objects.size.astype(np.float64), 1e-9)
     half = 0.5 * np.einsum('nij,nj->ni', np.abs(R), size)
-    radius = 0.5 * np.linalg.norm(size, axis=1)
-    apart = np.abs(translation[:, None] - translation[None])
-    meet = ((apart < half[:, None] + half[None]).all(-1)
-            & (np.linalg.norm(apart, axis=-1) < radius[:, None] + radius[None]))
-    np.fill_diagonal(meet, False)
-    return np.argwhere(meet).astype(np.int32)
+    return (kernels.Poses(R, np.ascontiguousarray(objects.translation, np.float64), size, half,
+                          0.5 * np.linalg.norm(size, axis=1), row.reshape(-1).astype(np.int32)),
+            kernels.Solids(np.array(samples).reshape(-1, count, 3),
+                           np.array(grids, bool).reshape(-1, CELLS, CELLS, CELLS)))
 
 
 def pairwise(objects: Candidates, models: Sequence[GenericModel]) -> Float64Array:

@@ -9,6 +9,7 @@ from hooc_perception.core.frame.kernels import field as kernel
 from hooc_perception.core.frame.kernels.records import Field
 from hooc_perception.core.geometry import back_project, inverse
 from hooc_perception.core.types import Observation, PixelProbabilities
+import numba as nb
 import numpy as np
 
 # Pixels to each side, and distance in space, of the points that a normal is fitted to.
@@ -103,7 +104,7 @@ def build_field(observation: Observation, cloud: Cloud, voxel_m: float = 0.005,
     data = np.zeros((*shape, kernel.CHANNELS), np.uint8)
     data[..., kernel.DISTANCE] = 255
     field = Field(data, lo, voxel_m, truncation_m)
-    kernel.fill_distance(field, cloud.points, cloud.normals)
+    kernel.fill_distance(field, cloud.points, cloud.normals, nb.get_num_threads())
     for view in observation.views:
         T = inverse(view.camera.T_world_camera)
         kernel.fill_free(field, view.depth, np.ascontiguousarray(T[:3, :3]),

@@ -17,8 +17,11 @@ class ProposeConfig(Config):
     polish: int = param(15, 'Hypotheses per category that are refined in the images.', low=1)
     polish_steps: int = param(10, 'Refinement steps in the images.', low=0)
     per_category: int = param(15, 'Candidates per category.', low=1)
-    round_samples: int = param(4000, 'Poses drawn per category in a round of re-proposal.',
-                               low=10)
+    round_samples: int = param(4000, 'Poses drawn per category in a round of re-proposal, where a '
+                               'third of the foreground is unexplained.', low=10)
+    least_effort: float = param(
+        0.3, 'Where less is unexplained, fewer candidates are drawn and refined in a round, but '
+        'at least this share.', '', 0.01, 1.0)
     round_pool: int = param(30, 'Hypotheses per category refined in such a round.', low=1)
     round_per_category: int = param(6, 'Candidates per category from such a round.', low=1)
     free_weight: float = param(0.7, 'Weight of a free-space violation in the voxel field.', '',

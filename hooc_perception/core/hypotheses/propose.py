@@ -34,6 +34,8 @@ from scipy.spatial.transform import Rotation
 MANY = 120
 # Weight of points that are explained, where the unexplained ones are drawn with 1.
 ELSEWHERE = 0.02
+# Where a third of the foreground is asked for, all candidates of a round are drawn.
+FULL_EFFORT = 3.0
 # Refinement in the images: cost of the squared log scale per covered pixel, and initial random
 # steps (metres, radians, log scale).
 SIZE_PRIOR, STEP_SIZES = 0.1, (0.006, 0.08, 0.05)
@@ -89,11 +91,23 @@ def propose_more(frame: Frame, objects: Candidates, config: ProposeConfig, costs
         weight = left
     if not left.any():
         return Candidates.empty()
+    effort = effort_of(float(left.mean()), config.least_effort)
     H, shape = sample(
         frame.cloud, frame.field, frame.shapes, config, rng,
-        SampleCounts(config.round_samples, config.round_pool, config.refine_steps), weight)
-    few = config.round_per_category
+        SampleCounts(share_of(config.round_samples, effort), share_of(config.round_pool, effort),
+                     config.refine_steps), weight)
+    few = share_of(config.round_per_category, effort)
     return _ranked(frame, _Ranking(config, costs, few, few), rng, H, shape, shown)
+
+
+def effort_of(share: float, least: float) -> float:
+    """Return the share of the candidates that are needed where a share of a scene is asked for."""
+    return min(max(FULL_EFFORT * share, least), 1.0)
+
+
+def share_of(number: int, share: float) -> int:
+    """Return a share of a number of candidates, at least one."""
+    return max(1, round(number * share))
 
 
 def _ranked(frame: Frame, ranking: _Ranking, rng: np.random.Generator, H: Float64Array,

@@ -38,6 +38,8 @@ TABLE_POINTS = 512
 QUICK_POINTS, SCORE_POINTS, REFINE_POINTS = 16, 32, 128
 # Initial random steps of the refinement in the field: metres, radians, log scale.
 STEP_SIZES = (0.01, 0.12, 0.08)
+# After this share of the refinement steps only the better half of the hypotheses goes on.
+FIRST_STEPS = 0.3
 # Added to the probability of every resting pose: in clutter objects lie in poses that they would
 # seldom take alone.
 REST_FLOOR = 0.05
@@ -117,9 +119,26 @@ def sample(cloud: Cloud, field: Field, shapes: Shapes, config: ProposeConfig,
     H, shape = np.concatenate(parts), np.concatenate(shape_of)
     filled = np.isfinite(H[:, SCORE])
     H, shape = np.ascontiguousarray(H[filled]), shape[filled]
-    refine_all(rng.integers(0, 2**31, len(H)), H, shape, t, field, weights,
-               FieldRefineSettings(REFINE_POINTS, counts.refine_steps, *STEP_SIZES))
+
+    def refine(steps: int) -> None:
+        refine_all(rng.integers(0, 2**31, len(H)), H, shape, t, field, weights,
+                   FieldRefineSettings(REFINE_POINTS, steps, *STEP_SIZES))
+
+    first = int(FIRST_STEPS * counts.refine_steps)
+    refine(first)
+    rows = _best_half(H[:, SCORE], shape)
+    H, shape = np.ascontiguousarray(H[rows]), shape[rows]
+    refine(counts.refine_steps - first)
     return H, shape
+
+
+def _best_half(score: Float64Array, shape: Int64Array) -> Int64Array:
+    """Return the rows of the better half of the hypotheses of each mesh, in their order."""
+    order = np.lexsort((-score, shape))
+    first = np.searchsorted(shape[order], shape[order])
+    place = np.arange(len(order)) - first
+    size = np.bincount(shape)[shape[order]] if len(shape) else first
+    return np.sort(order[2 * place < size])
 
 
 def _scene_cdf(cloud: Cloud, distrust: float, weight: Float64Array | None) -> Float64Array:

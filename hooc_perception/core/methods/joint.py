@@ -18,9 +18,7 @@ from hooc_perception.core.parsing.calibration import calibrated_scores
 from hooc_perception.core.parsing.config import ParseConfig
 from hooc_perception.core.parsing.revise import (
     around,
-    at_effort,
-    drawn_at_effort,
-    effort_of,
+    narrowed,
     search_with,
     with_held,
 )
@@ -90,13 +88,12 @@ class JointMethod:
         :param extra: further candidates.
         """
         deadline, rng = Deadline(self._parse.deadline_s), stage_rng(seed, 'parse')
-        effort = effort_of(frame, region, self._parse.revise.least_effort)
-        config, drawn = at_effort(self._parse, effort), drawn_at_effort(self._propose, effort)
+        config = narrowed(self._parse, frame, region, self._propose.least_effort)
         start = search_with(frame, before, region, config, max_instances)
         wide, held_before = around(region), start.held[:len(before.objects)]
 
         def more(objects: Candidates, turn: int) -> Candidates:
-            return propose_more(frame, objects, drawn, self.pixels,
+            return propose_more(frame, objects, self._propose, self.pixels,
                                 stage_rng(seed, 'propose', turn), wide)
 
         start.add(more(start.chosen.take(start.held[start.mask]), 0).extended(extra))

@@ -38,9 +38,6 @@ class ReviseConfig(Config):
 
     revise_rounds: int = param(1, 'Rounds of refinement and re-proposal where something has '
                                'changed.', low=0)
-    least_effort: float = param(
-        0.3, 'Where little has changed, this share of the candidates of a round of re-proposal is '
-        'enough; where a third of the foreground has changed, all are drawn.', '', 0.01, 1.0)
     revise_gain: float = param(
         40.0, 'Where nothing has changed, another object must be better by this to replace '
         'that of the previous answer.', 'px', 0.0, 1e5, runtime=True)

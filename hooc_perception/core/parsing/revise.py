@@ -13,7 +13,7 @@ from dataclasses import replace
 from hooc_perception.core.arrays import BoolArray, Float32Array, Float64Array
 from hooc_perception.core.frame.evidence import hypotheses_of
 from hooc_perception.core.frame.frame import Frame
-from hooc_perception.core.hypotheses.config import ProposeConfig
+from hooc_perception.core.hypotheses.propose import effort_of, share_of
 from hooc_perception.core.parsing.config import ParseConfig
 from hooc_perception.core.parsing.search import Search
 from hooc_perception.core.types import Candidates, ParsedScene
@@ -42,28 +42,18 @@ def search_with(frame: Frame, before: ParsedScene, region: Sequence[BoolArray],
     return search
 
 
-def effort_of(frame: Frame, region: Sequence[BoolArray], least: float) -> float:
-    """Return the share of a round's candidates that a region (H, W) bool per view needs."""
+def narrowed(config: ParseConfig, frame: Frame, region: Sequence[BoolArray], least: float,
+             ) -> ParseConfig:
+    """
+    Return the parameters of a search over a share of the candidates.
+
+    :param region: per view (H, W) bool, what is decided anew.
+    :param least: least share.
+    """
     foreground = sum(int(view.foreground.sum()) for view in frame.observation.views)
-    share = sum(int(mask.sum()) for mask in region) / max(foreground, 1)
-    return float(np.clip(3 * share, least, 1))
-
-
-def drawn_at_effort(config: ProposeConfig, effort: float) -> ProposeConfig:
-    """Return the parameters of a round of re-proposal that draws a share of the candidates."""
-    return replace(config, round_samples=_share_of(config.round_samples, effort),
-                   round_pool=_share_of(config.round_pool, effort),
-                   round_per_category=_share_of(config.round_per_category, effort))
-
-
-def at_effort(config: ParseConfig, effort: float) -> ParseConfig:
-    """Return the parameters of a search over a share of the candidates."""
-    return replace(config, kept=_share_of(config.kept, effort),
-                   finalists=_share_of(config.finalists, effort))
-
-
-def _share_of(number: int, share: float) -> int:
-    return max(1, round(number * share))
+    effort = effort_of(sum(int(mask.sum()) for mask in region) / max(foreground, 1), least)
+    return replace(config, kept=share_of(config.kept, effort),
+                   finalists=share_of(config.finalists, effort))
 
 
 def around(region: Sequence[BoolArray]) -> list[BoolArray]:

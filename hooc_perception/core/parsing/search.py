@@ -109,6 +109,8 @@ class Search:
         """Return the JointEnergy of the pool as it is, at the current subset."""
         if self._energy is None or self._energy.n != len(self.pool):
             self._energy = self._build_energy()
+        elif not np.array_equal(self._energy.mask, self.mask):
+            self._energy.reset(self.mask)
         return self._energy
 
     def add(self, new: Candidates) -> None:
@@ -140,8 +142,8 @@ class Search:
 
     def run(self, rng: np.random.Generator, late: Callable[[], bool]) -> SearchResult:
         """Search from the current subset, which becomes the best that was found."""
-        self._energy = self._build_energy()
-        energy = HeldEnergy(self._energy, self.held) if self.held.any() else self._energy
+        self.energy.reprice(self._penalty)
+        energy = HeldEnergy(self.energy, self.held) if self.held.any() else self.energy
         found = local_search(energy, rng, self.config.search, late)
         self.mask = found.mask
         return found

@@ -217,7 +217,8 @@ def test_a_drawn_pose_puts_the_point_on_the_scene_with_the_same_facing(model, sc
     for _ in range(10):
         drawing.draw_pose(
             h, drawing.Model(point, normal, np.array([[0, 0, 0, 1.0]]), np.ones(1)),
-            Surface(at, scene_normal), 0, drawn_with(size_sigma=0.0, tilted=1.0), q)
+            Surface(at, scene_normal), 0, drawn_with(size_sigma=0.0, tilted=1.0), q,
+            np.empty((3, 3)))
         rotation_of(h, R)
         np.testing.assert_allclose(R @ (point[0] * h[7:10]) + h[:3], at[0], atol=1e-9)
         np.testing.assert_allclose(R @ normal[0], scene_normal[0], atol=1e-9)
@@ -233,7 +234,8 @@ def test_resting_draws_stay_near_their_resting_pose():
     for _ in range(200):
         drawing.draw_pose(h, drawing.Model(point, up, rest, np.array([0.5, 1.0])),
                           Surface(np.zeros((1, 3)), up), 0,
-                          drawn_with(size_sigma=0.2, tilted=0.0), q)
+                          drawn_with(size_sigma=0.2, tilted=0.0), q,
+                          np.empty((3, 3)))
         lean.append(np.arccos(Rotation.from_quat(h[3:7]).as_matrix()[2, 2]))
         assert 0.5 <= h[7:10].min() <= h[7:10].max() <= 1.8
     # About half stand, about half lie.

@@ -35,9 +35,9 @@ Lists: TypeAlias = tuple[Int64Array, Int32Array, Int32Array]
 Runs: TypeAlias = tuple[Int32Array, Float64Array, Int32Array]
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, parallel=True)
 def build(offsets: Int64Array, pixel: Int32Array, depth: Float32Array, cost: Float32Array,
-          cost_none: Float32Array,
+          cost_none: Float32Array, blocks: int,
           ) -> tuple[Int32Array, Float32Array, Int32Array, Int32Array]:
     """
     Sort the candidates' entries into runs of slots, one run per pixel, nearest first.
@@ -47,6 +47,7 @@ def build(offsets: Int64Array, pixel: Int32Array, depth: Float32Array, cost: Flo
     :param depth: (E,) float32; equal depths keep the candidates' order.
     :param cost: (E,) float32.
     :param cost_none: (P,) float32.
+    :param blocks: number of threads; it does not change the result.
     :return: owner (E + P,) int32, slot_cost (E + P,) float32, start (P + 1,) int32 of each
         pixel's run, entry (E + P,) int32 of each slot, -1 for none.
     """
@@ -62,20 +63,25 @@ def build(offsets: Int64Array, pixel: Int32Array, depth: Float32Array, cost: Flo
     filled = np.zeros(n_pixels, np.int32)
     for p in range(n_pixels):
         slot_cost[start[p + 1] - 1] = cost_none[p]
-    for k in range(n):
-        for e in range(offsets[k], offsets[k + 1]):
-            p = pixel[e]
-            s = start[p] + filled[p]
-            filled[p] += 1
-            while s > start[p] and depth[entry[s - 1]] > depth[e]:
-                entry[s] = entry[s - 1]
-                owner[s] = owner[s - 1]
-                s -= 1
-            entry[s] = e
-            owner[s] = k
-    for p in range(n_pixels):
-        for s in range(start[p], start[p + 1] - 1):
-            slot_cost[s] = cost[entry[s]]
+    # Each block of pixels is filled by one thread, which looks at all entries in their order.
+    for block in nb.prange(blocks):
+        low, high = block * n_pixels // blocks, (block + 1) * n_pixels // blocks
+        for k in range(n):
+            for e in range(offsets[k], offsets[k + 1]):
+                p = pixel[e]
+                if p < low or p >= high:
+                    continue
+                s = start[p] + filled[p]
+                filled[p] += 1
+                while s > start[p] and depth[entry[s - 1]] > depth[e]:
+                    entry[s] = entry[s - 1]
+                    owner[s] = owner[s - 1]
+                    s -= 1
+                entry[s] = e
+                owner[s] = k
+        for p in range(low, high):
+            for s in range(start[p], start[p + 1] - 1):
+                slot_cost[s] = cost[entry[s]]
     return owner, slot_cost, start, entry
 
 

@@ -2,6 +2,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Occupancy grids of meshes by winding, and sample bits of pairs of posed models."""
 
+from typing import NamedTuple
+
 from hooc_perception.core.arrays import (
     BoolArray,
     Float64Array,
@@ -16,6 +18,36 @@ import numpy as np
 # Rays pass beside the cells' centres by this share of a cell, so that they miss the vertices
 # and edges that procedural meshes love to put on round coordinates.
 OFF_CENTRE = (0.0137, 0.0093)
+
+
+class Poses(NamedTuple):
+    """
+    Where n objects lie.
+
+    :ivar R: (n, 3, 3), t: (n, 3), model to world; size: (n, 3) metres along the model's axes.
+    :ivar half: (n, 3) half of the box around it along the world's axes; radius: (n,) of the
+        sphere around it, metres.
+    :ivar model: (n,) int32 row of Solids.
+    """
+
+    R: Float64Array
+    t: Float64Array
+    size: Float64Array
+    half: Float64Array
+    radius: Float64Array
+    model: Int32Array
+
+
+class Solids(NamedTuple):
+    """
+    Interiors of models, in the unit bounding box centred at the origin.
+
+    :ivar samples: (models, 64 * words, 3) float64.
+    :ivar grids: (models, cells, cells, cells) bool.
+    """
+
+    samples: Float64Array
+    grids: BoolArray
 
 
 @nb.njit(cache=True)
@@ -67,130 +99,183 @@ def count_bits(word: np.uint64) -> np.int64:
     return np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
 
 
-@nb.njit(cache=True, parallel=True)
-def sample_bits(pairs: Int32Array, model: Int32Array, R: Float64Array, t: Float64Array,
-                size: Float64Array, samples: Float64Array, grids: BoolArray,
-                bits: UInt64Array) -> None:
-    """
-    Set a bit for every interior sample of pairs[i, 0] that lies inside pairs[i, 1].
-
-    v_k of Eq. 1 (Basevi & Leonardis 2016) is made of these bits, see core/energy/overlap.py.
-
-    :param pairs: (m, 2) int32 objects.
-    :param model: (n,) int32 row of each object in `samples` and `grids`.
-    :param R: (n, 3, 3), t: (n, 3), model to world; size: (n, 3) metres along model axes.
-    :param samples: (models, 64 * words, 3) float64, unit bounding box centred at the origin.
-    :param grids: (models, cells, cells, cells) bool over the same box.
-    :param bits: (m, words) uint64, written.
-    """
-    cells = grids.shape[1]
-    for i in nb.prange(pairs.shape[0]):
-        k, j = pairs[i, 0], pairs[i, 1]
-        # One affine map takes samples of k to grid coordinates of j.
-        A = np.empty((3, 3))
-        b = np.empty(3)
-        for row in range(3):
-            scale = cells / size[j, row]
-            for col in range(3):
-                A[row, col] = scale * size[k, col] * (
-                    R[j, 0, row] * R[k, 0, col] + R[j, 1, row] * R[k, 1, col]
-                    + R[j, 2, row] * R[k, 2, col])
-            b[row] = 0.5 * cells + scale * (
-                R[j, 0, row] * (t[k, 0] - t[j, 0]) + R[j, 1, row] * (t[k, 1] - t[j, 1])
-                + R[j, 2, row] * (t[k, 2] - t[j, 2]))
-        grid, points = grids[model[j]], samples[model[k]]
-        for word in range(bits.shape[1]):
-            value = np.uint64(0)
-            for s in range(64):
-                p = points[64 * word + s]
-                x = A[0, 0] * p[0] + A[0, 1] * p[1] + A[0, 2] * p[2] + b[0]
-                if x < 0.0 or x >= cells:
-                    continue
-                y = A[1, 0] * p[0] + A[1, 1] * p[1] + A[1, 2] * p[2] + b[1]
-                if y < 0.0 or y >= cells:
-                    continue
-                z = A[2, 0] * p[0] + A[2, 1] * p[1] + A[2, 2] * p[2] + b[2]
-                if z < 0.0 or z >= cells:
-                    continue
-                if grid[int(x), int(y), int(z)]:
-                    value |= np.uint64(1) << np.uint64(s)
-            bits[i, word] = value
+@nb.njit(cache=True, inline='always')
+def _maps(k: int, j: int, poses: Poses, cells: int, A: Float64Array, b: Float64Array) -> None:
+    """Write the affine map A (3, 3), b (3,) from samples of k to grid coordinates of j."""
+    R, t, size = poses.R, poses.t, poses.size
+    for row in range(3):
+        scale = cells / size[j, row]
+        for col in range(3):
+            A[row, col] = scale * size[k, col] * (
+                R[j, 0, row] * R[k, 0, col] + R[j, 1, row] * R[k, 1, col]
+                + R[j, 2, row] * R[k, 2, col])
+        b[row] = 0.5 * cells + scale * (
+            R[j, 0, row] * (t[k, 0] - t[j, 0]) + R[j, 1, row] * (t[k, 1] - t[j, 1])
+            + R[j, 2, row] * (t[k, 2] - t[j, 2]))
 
 
 @nb.njit(cache=True)
-def cover(k: int, start: Int64Array, other: Int32Array, bits: UInt64Array, active: BoolArray,
-          union: UInt64Array, once: UInt64Array) -> None:
-    """Set union[k] and once[k]: samples of k in any, and in exactly one, active neighbour."""
-    for word in range(bits.shape[1]):
+def _sample_bits(k: int, j: int, poses: Poses, solids: Solids, A: Float64Array, b: Float64Array,
+                 bits: UInt64Array) -> bool:
+    """Set a bit of `bits` (words,) per sample of k inside j; return whether there is any."""
+    cells = solids.grids.shape[1]
+    _maps(k, j, poses, cells, A, b)
+    grid, points = solids.grids[poses.model[j]], solids.samples[poses.model[k]]
+    found = False
+    for word in range(bits.shape[0]):
+        value = np.uint64(0)
+        for s in range(64):
+            p = points[64 * word + s]
+            x = A[0, 0] * p[0] + A[0, 1] * p[1] + A[0, 2] * p[2] + b[0]
+            if x < 0.0 or x >= cells:
+                continue
+            y = A[1, 0] * p[0] + A[1, 1] * p[1] + A[1, 2] * p[2] + b[1]
+            if y < 0.0 or y >= cells:
+                continue
+            z = A[2, 0] * p[0] + A[2, 1] * p[1] + A[2, 2] * p[2] + b[2]
+            if z < 0.0 or z >= cells:
+                continue
+            if grid[int(x), int(y), int(z)]:
+                value |= np.uint64(1) << np.uint64(s)
+        bits[word] = value
+        found |= value != 0
+    return found
+
+
+@nb.njit(cache=True, inline='always')
+def _apart(k: int, j: int, poses: Poses) -> bool:
+    """Return whether the spheres or the boxes around two objects do not meet."""
+    squared = 0.0
+    for axis in range(3):
+        d = abs(poses.t[k, axis] - poses.t[j, axis])
+        if d >= poses.half[k, axis] + poses.half[j, axis]:
+            return True
+        squared += d * d
+    reach = poses.radius[k] + poses.radius[j]
+    return squared >= reach * reach
+
+
+@nb.njit(cache=True, parallel=True)
+def compare(objects: Int64Array, poses: Poses, solids: Solids, meets: BoolArray,
+            inside: UInt64Array, around: UInt64Array) -> None:
+    """
+    Compare each of some objects with all n.
+
+    v_k of Eq. 1 (Basevi & Leonardis 2016) is made of these bits, see core/energy/overlap.py.
+
+    :param objects: (m,) int64.
+    :param meets: (m, n) bool, written: whether the two have a common volume.
+    :param inside: (m, n, words) uint64, written: samples of objects[i] inside each other one.
+    :param around: (m, n, words) uint64, written: samples of each other one inside objects[i].
+    """
+    n = poses.model.shape[0]
+    for i in nb.prange(objects.shape[0]):
+        k = objects[i]
+        A, b = np.empty((3, 3)), np.empty(3)
+        for j in range(n):
+            meets[i, j] = False
+            if j == k or _apart(k, j, poses):
+                continue
+            first = _sample_bits(k, j, poses, solids, A, b, inside[i, j])
+            second = _sample_bits(j, k, poses, solids, A, b, around[i, j])
+            meets[i, j] = first or second
+
+
+@nb.njit(cache=True)
+def cover(k: int, rows: Int64Array, meets: BoolArray, around: UInt64Array, union: UInt64Array,
+          once: UInt64Array) -> None:
+    """Set union[k] and once[k]: samples of k in any, and in exactly one, chosen object."""
+    for word in range(union.shape[1]):
         any_bits, twice = np.uint64(0), np.uint64(0)
-        for e in range(start[k], start[k + 1]):
-            if active[other[e]]:
-                twice |= any_bits & bits[e, word]
-                any_bits |= bits[e, word]
+        for i in rows:
+            if meets[i, k]:
+                twice |= any_bits & around[i, k, word]
+                any_bits |= around[i, k, word]
         union[k, word] = any_bits
         once[k, word] = any_bits & ~twice
 
 
 @nb.njit(cache=True)
-def cover_all(start: Int64Array, other: Int32Array, bits: UInt64Array, active: BoolArray,
-              union: UInt64Array, once: UInt64Array) -> int | np.int64:
-    """Set union and once of all; return the samples of active ones that are covered."""
-    total = 0
-    for k in range(active.shape[0]):
-        cover(k, start, other, bits, active, union, once)
-        if active[k]:
-            for word in range(bits.shape[1]):
-                total += count_bits(union[k, word])
-    return total
+def flip_delta(k: int, chosen: Int64Array, rows: Int64Array, active: BoolArray,
+               meets: BoolArray, inside: UInt64Array, union: UInt64Array, once: UInt64Array,
+               ) -> int | np.int64:
+    """
+    Return the change of the number of covered samples of chosen objects if k flips.
 
-
-@nb.njit(cache=True)
-def flip_delta(k: int, start: Int64Array, other: Int32Array, reverse: Int64Array,
-               bits: UInt64Array, active: BoolArray, union: UInt64Array,
-               once: UInt64Array) -> int | np.int64:
-    """Return the change of the number of covered samples of active ones if k flips."""
+    :param inside: seen from k's side, [i, k]: samples of chosen[i] inside k.
+    """
     total = 0
-    for word in range(bits.shape[1]):
+    for word in range(union.shape[1]):
         total += count_bits(union[k, word])
-    for e in range(start[k], start[k + 1]):
-        j = other[e]
-        if active[j]:
-            for word in range(bits.shape[1]):
+    for c in range(chosen.shape[0]):
+        i, j = rows[c], chosen[c]
+        if meets[i, k]:
+            for word in range(union.shape[1]):
                 # Samples of j inside k that are covered by k alone, or would be.
                 alone = once[j, word] if active[k] else ~union[j, word]
-                total += count_bits(bits[reverse[e], word] & alone)
+                total += count_bits(inside[i, k, word] & alone)
     return -total if active[k] else total
 
 
 @nb.njit(cache=True)
-def flip_deltas(start: Int64Array, other: Int32Array, reverse: Int64Array, bits: UInt64Array,
-                active: BoolArray, union: UInt64Array, once: UInt64Array,
-                deltas: Int64Array) -> None:
-    """Set deltas (n,) int64, the flip_delta of every candidate."""
+def restart(chosen: Int64Array, rows: Int64Array, active: BoolArray, meets: BoolArray,
+            inside: UInt64Array, around: UInt64Array, union: UInt64Array, once: UInt64Array,
+            deltas: Int64Array) -> int | np.int64:
+    """
+    Set union, once and deltas of all; return the samples of chosen objects that are covered.
+
+    :param chosen: (s,) int64 objects of the subset; `rows` (s,) their rows in meets, inside and
+        around; `active` (n,) bool, the same subset.
+    :param deltas: (n,) int64, the flip_delta of each object.
+    """
+    total = 0
     for k in range(active.shape[0]):
-        deltas[k] = flip_delta(k, start, other, reverse, bits, active, union, once)
+        cover(k, rows, meets, around, union, once)
+        if active[k]:
+            for word in range(union.shape[1]):
+                total += count_bits(union[k, word])
+    for k in range(active.shape[0]):
+        deltas[k] = flip_delta(k, chosen, rows, active, meets, inside, union, once)
+    return total
 
 
 @nb.njit(cache=True)
-def flip(k: int, start: Int64Array, other: Int32Array, bits: UInt64Array, active: BoolArray,
-         union: UInt64Array, once: UInt64Array) -> None:
-    """Flip k and update union and once of its neighbours."""
-    active[k] = not active[k]
-    for e in range(start[k], start[k + 1]):
-        cover(other[e], start, other, bits, active, union, once)
+def update(flipped: int, row: int, chosen: Int64Array, rows: Int64Array, active: BoolArray,
+           meets: BoolArray, inside: UInt64Array, around: UInt64Array, union: UInt64Array,
+           once: UInt64Array, deltas: Int64Array) -> None:
+    """
+    Bring union, once and deltas up to date after one object has joined or left the subset.
+
+    :param row: of the flipped object in meets, inside and around.
+    """
+    n = active.shape[0]
+    stale = np.zeros(n, np.bool_)
+    stale[flipped] = True
+    for k in range(n):
+        if meets[row, k]:
+            cover(k, rows, meets, around, union, once)
+            stale[k] = True
+    # The deltas look at chosen neighbours: those of a changed one have changed, too.
+    for c in range(chosen.shape[0]):
+        if meets[row, chosen[c]]:
+            for k in range(n):
+                stale[k] |= meets[rows[c], k]
+    for k in range(n):
+        if stale[k]:
+            deltas[k] = flip_delta(k, chosen, rows, active, meets, inside, union, once)
 
 
 @nb.njit(cache=True)
-def covered(members: Int64Array, chosen: BoolArray, start: Int64Array, other: Int32Array,
-            bits: UInt64Array, counts: Int64Array) -> None:
-    """Set counts (m,): samples of each of `members` inside any other with chosen (n,) True."""
+def covered(members: Int64Array, rows: Int64Array, meets: BoolArray, around: UInt64Array,
+            counts: Int64Array) -> None:
+    """Set counts (m,): samples of each of `members` (m,) inside any other, with their `rows`."""
     for i in range(members.shape[0]):
         k = members[i]
         total = 0
-        for word in range(bits.shape[1]):
+        for word in range(around.shape[2]):
             value = np.uint64(0)
-            for e in range(start[k], start[k + 1]):
-                if chosen[other[e]]:
-                    value |= bits[e, word]
+            for row in rows:
+                if meets[row, k]:
+                    value |= around[row, k, word]
             total += count_bits(value)
         counts[i] = total

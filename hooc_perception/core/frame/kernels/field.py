@@ -17,7 +17,7 @@ DISTANCE, FREE, NORMAL, HEIGHT = 0, 1, 2, 5
 FEWEST_NEIGHBOURS = 6
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, parallel=True)
 def normals_of_view(points: Float64Array, valid: BoolArray, t_world_camera: Float64Array,
                     radius_px: int, gate_m: float) -> Float32Array:
     """
@@ -29,8 +29,8 @@ def normals_of_view(points: Float64Array, valid: BoolArray, t_world_camera: Floa
     """
     h, w = valid.shape
     out = np.full((h, w, 3), np.nan, np.float32)
-    C = np.empty((3, 3))
-    for v in range(h):
+    for v in nb.prange(h):
+        C = np.empty((3, 3))
         for u in range(w):
             if not valid[v, u]:
                 continue
@@ -88,8 +88,9 @@ def _covariance(points: Float64Array, valid: BoolArray, v: int, u: int, radius_p
     return n
 
 
-@nb.njit(cache=True)
-def fill_distance(field: Field, points: Float64Array, normals: Float64Array) -> None:
+@nb.njit(cache=True, parallel=True)
+def fill_distance(field: Field, points: Float64Array, normals: Float64Array,
+                  blocks: int) -> None:
     """
     Write what is known of the surface point nearest to each voxel's centre into the field.
 
@@ -97,35 +98,39 @@ def fill_distance(field: Field, points: Float64Array, normals: Float64Array) -> 
     over the tangent plane of that point: 128 + 127 = `truncation`.
 
     :param points: (n, 3) float64 surface points; `normals` (n, 3) float64 unit.
+    :param blocks: number of threads; it does not change the result.
     """
     data, origin, voxel, truncation = field.data, field.origin, field.voxel, field.truncation
     nx, ny, nz = data.shape[:3]
     r = int(np.ceil(truncation / voxel))
     best = np.full((nx, ny, nz), truncation * truncation, np.float32)
-    for i in range(points.shape[0]):
-        gx = (points[i, 0] - origin[0]) / voxel
-        gy = (points[i, 1] - origin[1]) / voxel
-        gz = (points[i, 2] - origin[2]) / voxel
-        cx, cy, cz = int(gx), int(gy), int(gz)
-        for x in range(max(0, cx - r), min(nx, cx + r + 1)):
-            dx = (x + 0.5 - gx) * voxel
-            for y in range(max(0, cy - r), min(ny, cy + r + 1)):
-                dy = (y + 0.5 - gy) * voxel
-                dxy = dx * dx + dy * dy
-                for z in range(max(0, cz - r), min(nz, cz + r + 1)):
-                    dz = (z + 0.5 - gz) * voxel
-                    d = dxy + dz * dz
-                    if d < best[x, y, z]:
-                        best[x, y, z] = d
-                        data[x, y, z, DISTANCE] = np.uint8(255 * np.sqrt(d) / truncation)
-                        data[x, y, z, NORMAL] = np.uint8(128.5 + 127 * normals[i, 0])
-                        data[x, y, z, NORMAL + 1] = np.uint8(128.5 + 127 * normals[i, 1])
-                        data[x, y, z, NORMAL + 2] = np.uint8(128.5 + 127 * normals[i, 2])
-                        height = dx * normals[i, 0] + dy * normals[i, 1] + dz * normals[i, 2]
-                        data[x, y, z, HEIGHT] = np.uint8(128.5 + 127 * height / truncation)
+    # Each slab of voxels is filled by one thread, which looks at all points in their order.
+    for block in nb.prange(blocks):
+        low, high = block * nx // blocks, (block + 1) * nx // blocks
+        for i in range(points.shape[0]):
+            gx = (points[i, 0] - origin[0]) / voxel
+            gy = (points[i, 1] - origin[1]) / voxel
+            gz = (points[i, 2] - origin[2]) / voxel
+            cx, cy, cz = int(gx), int(gy), int(gz)
+            for x in range(max(low, cx - r), min(high, cx + r + 1)):
+                dx = (x + 0.5 - gx) * voxel
+                for y in range(max(0, cy - r), min(ny, cy + r + 1)):
+                    dy = (y + 0.5 - gy) * voxel
+                    dxy = dx * dx + dy * dy
+                    for z in range(max(0, cz - r), min(nz, cz + r + 1)):
+                        dz = (z + 0.5 - gz) * voxel
+                        d = dxy + dz * dz
+                        if d < best[x, y, z]:
+                            best[x, y, z] = d
+                            data[x, y, z, DISTANCE] = np.uint8(255 * np.sqrt(d) / truncation)
+                            data[x, y, z, NORMAL] = np.uint8(128.5 + 127 * normals[i, 0])
+                            data[x, y, z, NORMAL + 1] = np.uint8(128.5 + 127 * normals[i, 1])
+                            data[x, y, z, NORMAL + 2] = np.uint8(128.5 + 127 * normals[i, 2])
+                            height = dx * normals[i, 0] + dy * normals[i, 1] + dz * normals[i, 2]
+                            data[x, y, z, HEIGHT] = np.uint8(128.5 + 127 * height / truncation)
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, parallel=True)
 def fill_free(field: Field, depth: Float32Array, R_camera_world: Float64Array,
               t_camera_world: Float64Array, K: Float64Array, margin: float, full: float) -> None:
     """
@@ -139,7 +144,7 @@ def fill_free(field: Field, depth: Float32Array, R_camera_world: Float64Array,
     nx, ny, nz = data.shape[:3]
     h, w = depth.shape
     R, t = R_camera_world, t_camera_world
-    for x in range(nx):
+    for x in nb.prange(nx):
         for y in range(ny):
             for z in range(nz):
                 px = origin[0] + (x + 0.5) * voxel

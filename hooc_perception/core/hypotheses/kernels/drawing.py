@@ -18,7 +18,11 @@ from hooc_perception.core.hypotheses.kernels.records import (
     ScoreWeights,
     Surface,
 )
-from hooc_perception.core.hypotheses.kernels.scoring import quick_score, score
+from hooc_perception.core.hypotheses.kernels.scoring import (
+    field_evidence,
+    quick_score,
+    score_of,
+)
 from hooc_perception.core.kernels.pose import (
     quaternion_multiply,
     QW,
@@ -43,6 +47,9 @@ QUICK_MEAN = 12.0
 # The best of every cell of the table are kept, so that no part of a scene crowds out the rest.
 CELL_M = 0.04
 PER_CELL = 4
+# A draw is given up if a first share of its points reaches less than a share of the score of what
+# it has to replace.
+FIRST_SHARE, HOPEFUL = 0.375, 0.5
 # Limits of the drawn scale, and spread of the axes about the common factor.
 LEAST_SCALE, GREATEST_SCALE = 0.5, 1.8
 ASPECT = 0.6
@@ -134,18 +141,17 @@ def _turn_onto(h: Float64Array, m: tuple[float, float, float], s: tuple[float, f
 
 @nb.njit(cache=True)
 def draw_pose(h: Float64Array, model: Model, scene: Surface, i: int, settings: DrawSettings,
-              q: Float64Array) -> None:
+              q: Float64Array, R: Float64Array) -> None:
     """
     Fill `h` (10,) so that one model point lies on scene point i with the same facing.
 
-    :param q: (4,) float64 scratch.
+    :param q: (4,) and R (3, 3), float64 scratch.
     """
     iso = np.exp(np.random.normal() * settings.size_sigma)
     for k in range(3):
         factor = np.exp(np.random.normal() * ASPECT * settings.size_sigma)
         h[SX + k] = min(GREATEST_SCALE, max(LEAST_SCALE, iso * factor))
     s = scene.normals[i, 0], scene.normals[i, 1], scene.normals[i, 2]
-    R = np.empty((3, 3))
     resting = np.random.random() >= settings.tilted
     h[QX], h[QY], h[QZ], h[QW] = 0.0, 0.0, 0.0, 1.0
     if resting:
@@ -169,15 +175,26 @@ def draw_pose(h: Float64Array, model: Model, scene: Surface, i: int, settings: D
 
 
 @nb.njit(cache=True, inline='always')
-def _keep_if_better(cell: Float64Array, h: Float64Array, reached: float) -> None:
-    """Replace the worst of the hypotheses (PER_CELL, 11) of a cell if `h` scores better."""
+def _worst_of(cell: Float64Array) -> int:
+    """Return the row of the worst of the hypotheses (PER_CELL, 11) of a cell."""
     worst = 0
     for k in range(1, PER_CELL):
         if cell[k, SCORE] < cell[worst, SCORE]:
             worst = k
-    if reached > cell[worst, SCORE]:
-        cell[worst, :WIDTH] = h
-        cell[worst, SCORE] = reached
+    return worst
+
+
+@nb.njit(cache=True)
+def _score_if_hopeful(h: Float64Array, surface: Surface, n: int, field: Field,
+                      weights: ScoreWeights, R: Float64Array, equations: Float64Array,
+                      least: float) -> float:
+    """Return the score of `h` from n points, or -inf if the first of them have little hope."""
+    first = int(FIRST_SHARE * n)
+    a = field_evidence(h, surface, 0, first, field, R, equations)
+    if least > 0.0 and score_of(h, first, a, weights) < HOPEFUL * least:
+        return -np.inf
+    b = field_evidence(h, surface, first, n, field, R, equations)
+    return score_of(h, n, (a[0] + b[0], a[1] + b[1], a[2] + b[2]), weights)
 
 
 @nb.njit(cache=True)
@@ -202,15 +219,20 @@ def sample(seed: int, model: Model, scene: Surface, scene_cdf: Float64Array, fie
     for _ in range(settings.samples):
         i = np.searchsorted(scene_cdf, np.random.random() * scene_cdf[-1])
         i = min(i, scene.points.shape[0] - 1)
-        draw_pose(h, model, scene, i, settings, q)
+        draw_pose(h, model, scene, i, settings, q, R)
         # Most draws are hopeless: a few points in a small field, which fits the cache, tell.
         if (quick_score(h, model.points, settings.first_points, quick, field, R)
                 < QUICK_MEAN * settings.first_points):
             continue
-        reached = score(h, surface, settings.points, field, weights, R, no_equations)
         x = min(np_x - 1, max(0, int((h[TX] - origin[0]) / CELL_M)))
         y = min(np_y - 1, max(0, int((h[TY] - origin[1]) / CELL_M)))
-        _keep_if_better(cells[x * np_y + y], h, reached)
+        cell = cells[x * np_y + y]
+        worst = _worst_of(cell)
+        reached = _score_if_hopeful(h, surface, settings.points, field, weights, R, no_equations,
+                                    cell[worst, SCORE])
+        if reached > cell[worst, SCORE]:
+            cell[worst, :WIDTH] = h
+            cell[worst, SCORE] = reached
     flat = cells.reshape(-1, WIDTH + 1)
     order = np.argsort(-flat[:, SCORE])
     out = np.full((settings.keep, WIDTH + 1), -np.inf)

@@ -151,7 +151,14 @@ def _height(field: Field, gx: float, gy: float, gz: float,
 def score(h: Float64Array, surface: Surface, n: int, field: Field, weights: ScoreWeights,
           R: Float64Array, equations: Float64Array) -> float:
     """Return the score of hypothesis `h` from the first n points of its model; see the module."""
-    agree, violate, crowded = field_evidence(h, surface, 0, n, field, R, equations)
+    return score_of(h, n, field_evidence(h, surface, 0, n, field, R, equations), weights)
+
+
+@nb.njit(cache=True)
+def score_of(h: Float64Array, n: int, evidence: tuple[float, float, float],
+             weights: ScoreWeights) -> float:
+    """Return the score of hypothesis `h` from what field_evidence returned for n points."""
+    agree, violate, crowded = evidence
     area = (h[SX] * h[SY] + h[SY] * h[SZ] + h[SX] * h[SZ]) / 3.0
     return ((agree - weights.free * violate - weights.shell * crowded) / n * area / (area + 0.5)
             * 1.5 - weights.size_prior * squared_log_scale(h))

@@ -125,6 +125,7 @@ class Following:
             try:
                 answer = running.result()
                 self._diagnostics.ok('full_parse', seconds=now - self._full_at)
+                self._diagnostics.count('full_parse', 'ended')
             except HoocError as error:
                 self._failed(str(error))
             self._full_at = now

@@ -92,7 +92,8 @@ def test_the_standing_answer_is_given_until_the_new_one_takes_over(bench, puppet
     assert len(bench.heard['objects/poses']) == 4   # with the next frame set, not before
     # Nothing else has changed, so the next frame set has the same answer again.
     assert answer().poses == standing.poses[:1] == answer().poses
-    assert 'full_parse' in bench.reasons(bench.chain[3]) and not made[0].is_discarded
+    assert bench.reasons(bench.chain[3])['full_parse'][0] == 'ok' and not made[0].is_discarded
+    assert bench.chain[3].diagnostics._counts['full_parse', 'ended'] == 1
 
 
 def test_a_change_makes_it_useless(puppet):

@@ -15,6 +15,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import time
 import traceback
 from typing import BinaryIO, cast, Generic, TypeVar
 
@@ -37,7 +38,7 @@ class Background(Generic[T]):
         paths = os.pathsep.join(filter(None, sys.path))
         # A session of its own: Ctrl-C reaches the node only, which gives the work up.
         self._process = subprocess.Popen(
-            [sys.executable, '-m', 'hooc_perception.nodes.background'],
+            [sys.executable, '-m', 'hooc_perception.nodes.background', str(os.getpid())],
             env={**os.environ, 'PYTHONPATH': paths}, stdin=subprocess.PIPE,
             stdout=subprocess.PIPE, start_new_session=True)
         self._value: T | None = None
@@ -66,19 +67,27 @@ class Background(Generic[T]):
 
     def _wait(self, work: Callable[[], T]) -> None:
         """Pass the work on and wait for its end, in a thread."""
-        try:
-            reply, _ = self._process.communicate(pickle.dumps(work, pickle.HIGHEST_PROTOCOL))
-            if reply:
-                self._value, self._failure = pickle.loads(reply)
-            else:
-                code = self._process.returncode
-                self._failure = f'its process has ended early (exit code {code})' + (
-                    '; was there too little memory?' if code == -9 else '')
-        except Exception as error:
-            self._failure = _sentence(error)
-        finally:
-            self._process.kill()
-            self._process.wait()
+        with self._process as process:
+            try:
+                self._value, self._failure = _exchanged(process, work)
+            except Exception as error:
+                self._failure = _sentence(error)
+            finally:
+                process.kill()
+
+
+def _exchanged(process: 'subprocess.Popen[bytes]', work: Callable[[], T],
+               ) -> tuple[T | None, str | None]:
+    """Return what `serve` answers in another process, or how that ended."""
+    assert process.stdin is not None and process.stdout is not None
+    # It may end while it reads, and then there is no reply.
+    with suppress(BrokenPipeError), process.stdin as job:
+        pickle.dump(work, job, pickle.HIGHEST_PROTOCOL)
+    if reply := process.stdout.read():
+        return pickle.loads(reply)
+    code = process.wait()
+    return None, f'its process has ended early (exit code {code})' + (
+        '; was there too little memory?' if code == -9 else '')
 
 
 def serve(job: BinaryIO, reply: BinaryIO) -> None:
@@ -99,7 +108,15 @@ def _sentence(error: Exception) -> str:
         f'unexpected {type(error).__name__}: {error}')
 
 
+def _end_with(parent: int) -> None:
+    """Wait until another process becomes the parent, then end this one."""
+    while os.getppid() == parent:
+        time.sleep(0.5)
+    os._exit(1)
+
+
 if __name__ == '__main__':
+    threading.Thread(target=_end_with, args=(int(sys.argv[1]),), daemon=True).start()
     if hasattr(os, 'nice'):     # Windows has none
         os.nice(NICE)
     # What libraries print must not get into the reply.

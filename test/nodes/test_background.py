@@ -13,6 +13,7 @@ import time
 from hooc_perception.errors import HoocError
 from hooc_perception.nodes.background import Background
 from hooc_perception.trained.folder import load_model_folder
+import psutil
 import pytest
 
 
@@ -57,11 +58,18 @@ def test_what_is_given_up_ends_at_once():
         ended(background, 10.0).result()
 
 
-def test_a_node_that_ends_does_not_wait_for_it():
-    code = ('from functools import partial; import time; '
+@pytest.mark.parametrize('how', ['pass', 'os.kill(os.getpid(), 9)'])
+def test_it_ends_with_the_node_however_that_ends(how):
+    code = ('from functools import partial; import os, time; '
             'from hooc_perception.nodes.background import Background; '
-            'Background(partial(time.sleep, 20))')
-    subprocess.run([sys.executable, '-c', code], check=True, timeout=15)
+            'work = Background(partial(time.sleep, 600)); '
+            f'print(work._process.pid, flush=True); {how}')
+    number = int(subprocess.run([sys.executable, '-c', code], timeout=60, text=True,
+                                stdout=subprocess.PIPE).stdout)
+    deadline = time.monotonic() + 30
+    while psutil.pid_exists(number) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not psutil.pid_exists(number)
 
 
 def test_its_process_needs_no_ros():

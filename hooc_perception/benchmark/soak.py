@@ -44,9 +44,9 @@ from std_msgs.msg import Header
 # Probability that a camera drops out at a frame, and for how long, s.
 DROP_OUT, AWAY_S = 0.02, (3.0, 10.0)
 SAMPLE_S = 1.0
-# A table changes after an exponentially distributed time, s: some full parses end in between, some
-# do not; but not before so many frame sets that show the last change have been answered.
-MEAN_PAUSE_S, ANSWERS = 10.0, (1, 6)
+# A table changes after one of these times, s: a full parse ends within the longest; but not before
+# so many frame sets that show the last change have been answered.
+PAUSES_S, ANSWERS = (3.0, 5.0, 8.0, 12.0, 40.0), (1, 6)
 
 
 def soak(scene: str | Path | ChangingTable, parameters: Mapping[str, Mapping[str, Any]],
@@ -145,7 +145,7 @@ class _Run:
                 stamp_ns = self._now_ns()
                 if self._check is not None and now >= next_change and (
                         self._check.since_change >= self._wanted):
-                    next_change = now + self._rng.exponential(MEAN_PAUSE_S)
+                    next_change = now + self._rng.choice(PAUSES_S)
                     self._change(stamp_ns)
                 self._send(now, stamp_ns)
             if now >= next_sample:

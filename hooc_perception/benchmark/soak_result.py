@@ -14,6 +14,8 @@ import numpy as np
 # The first answers compile, load and fill caches: growth counts after this many of them and after
 # this share of the time.
 WARM_ANSWERS, WARM_UP = 8, 0.3
+# The level to which memory falls back, percentile.
+LEVEL = 10
 COLOURS = {'put': 'tab:green', 'taken': 'tab:orange', 'moved': 'tab:blue'}
 
 
@@ -47,10 +49,16 @@ class SoakResult:
     start_ns: int = 0
 
     def growth_mb(self, name: str) -> float:
-        """Return the growth of a process after warm-up: last quarter minus first quarter."""
+        """
+        Return the growth of a process after warm-up: last quarter minus first quarter.
+
+        Of each, the level counts to which memory falls back: it rises while a node computes, which
+        it does more or less often.
+        """
         rows = self.memory_mb[name][self._warm():]
         quarter = max(1, len(rows) // 4)
-        return float(np.median(rows[-quarter:]) - np.median(rows[:quarter]))
+        return float(np.nanpercentile(rows[-quarter:], LEVEL)
+                     - np.nanpercentile(rows[:quarter], LEVEL))
 
     def growth_mb_per_hour(self, name: str) -> float:
         """Return the slope of a line through the memory of a process after warm-up."""

@@ -152,6 +152,14 @@ def test_what_is_missing_and_what_is_not_there_is_counted(check):
     assert (result.true, result.found, result.false) == (5, 3, 1)
 
 
+def test_only_a_level_that_rises_is_growth():
+    seconds = np.arange(400.0)
+    peaks = 400 + 60.0 * (seconds % 20 < 4 + 12 * (seconds > 250))
+    result = SoakResult(seconds, np.arange(400), {'peaks': peaks, 'leak': peaks + seconds / 10},
+                        400, 400, 400, 0, 0)
+    assert result.growth_mb('peaks') == 0 and 15 < result.growth_mb('leak') < 40
+
+
 def test_changes_are_drawn(check, tmp_path):
     changes = judged(check, MOVED, BOTH, [found(7, NEW), found(8, B)])
     seconds = np.arange(4.0)

@@ -105,7 +105,8 @@ def _print(result: 'SoakResult') -> bool:
         (f'{result.frames} images, {result.sets} frame sets, {result.answers} answered, '
          f'{result.refused} rejected, {result.deaths} deaths. Reason counts: {reasons}.',
          f'Full parses in the background: at most {result.background_mb:.0f} MB.',
-         'growth: median of the last quarter minus that of the first quarter after warm-up.'))))
+         'growth: of the level to which memory falls back (10th percentile), from the first '
+         'quarter after warm-up to the last.'))))
     return flat
 
 

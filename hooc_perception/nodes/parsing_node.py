@@ -183,6 +183,7 @@ class Parsing:
         self._answered = None
         self._hidden.forget()
         self._log.forget()
+        self._tracker.retract()
         now = self._node.now_ns(), self._node.config.target_frame
         self.output.clear(*now)
         clear_all(self._node, self.adapters, *now)

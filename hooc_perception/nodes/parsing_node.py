@@ -3,7 +3,7 @@
 """Stage 4: candidates -> the objects that together explain the frame set."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 import json
 import sys
 import time
@@ -11,13 +11,11 @@ from typing import Any
 
 from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import PARSING
-from hooc_perception.core.arrays import Float64Array
-from hooc_perception.core.config import param
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.parsing.events import EventLog
 from hooc_perception.core.parsing.hidden_objects import HiddenObjects
-from hooc_perception.core.parsing.tracking import TrackConfig, Tracker
+from hooc_perception.core.parsing.tracking import Tracker
 from hooc_perception.core.parsing.unexplained import unexplained_points
 from hooc_perception.core.types import (
     Candidates,
@@ -26,7 +24,8 @@ from hooc_perception.core.types import (
     ParsedScene,
     PixelProbabilities,
 )
-from hooc_perception.nodes.following import FollowConfig, Following
+from hooc_perception.nodes.following import Following
+from hooc_perception.nodes.leftover import Leftover
 from hooc_perception.nodes.model import (
     camera_names,
     mesh_uris,
@@ -34,44 +33,23 @@ from hooc_perception.nodes.model import (
     node_profile,
     parser_of,
 )
+from hooc_perception.nodes.parsing_config import ParsingConfig
 from hooc_perception.nodes.warm_up import warmed
 from hooc_perception.ros.health.diagnostics import WARN
 from hooc_perception.ros.inputs.view_input import ViewInput
 from hooc_perception.ros.lifecycle.spin import run_node
-from hooc_perception.ros.lifecycle.stage_config import StageConfig
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.stages import (
     candidates_from_messages,
     probabilities_from_message,
 )
-from hooc_perception.ros.outputs.adapters.choose import (
-    AdapterConfig,
-    adapters_of,
-    clear_all,
-    publish_all,
-)
+from hooc_perception.ros.outputs.adapters.choose import adapters_of, clear_all, publish_all
 from hooc_perception.ros.outputs.detect_service import DetectService
 from hooc_perception.ros.outputs.detected import detected_scene
 from hooc_perception.ros.outputs.event_output import EventOutput
 from hooc_perception.ros.outputs.object_output import ObjectOutput
-import numpy as np
 from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import SetBool, Trigger
-
-
-@dataclass(frozen=True)
-class ParsingConfig(FollowConfig, AdapterConfig, TrackConfig, StageConfig):
-    """Parameters of the parsing node."""
-
-    max_instances: int = param(-1, 'Maximum number of objects per category in a scene; 0 = no '
-                               'limit, -1 = the limit of the model.', '', -1, 1000)
-    sigmas: bool = param(True, 'Estimate sigma_t and sigma_r, at about 0.05 CPU seconds per '
-                         'object.', runtime=True)
-    keep_answer_s: float = param(0.0, 'A result is retracted after this time without a '
-                                 'successor, as by `reset`; 0 = never.', 's', 0.0, 86400.0,
-                                 runtime=True)
-    detect_timeout_s: float = param(30.0, 'The detect service gives up after this time.', 's',
-                                    0.1, 600.0, runtime=True)
 
 
 class ParsingNode(StageNode[ParsingConfig, 'Parsing']):
@@ -96,7 +74,7 @@ class ParsingNode(StageNode[ParsingConfig, 'Parsing']):
     def deactivate(self) -> None:
         """Retract the result, which nobody keeps up to date any more, and let nobody wait."""
         self.detect.fail('the node was deactivated')
-        self.work.retract()
+        self.work.stop()
 
     def cleanup(self) -> None:
         """Begin anew with the next configuration."""
@@ -122,7 +100,8 @@ class Parsing:
                                  node.config.sigmas)
         warmed(node, model, self._try_out)
         self._tracker = Tracker(model.models, node.config)
-        self._following, self._log = Following(), EventLog(model.models)
+        self._following = Following(node.diagnostics)
+        self._log, self._leftover = EventLog(model.models), Leftover(model.models)
         self._hidden = HiddenObjects(model.models, node.config, self._parser.max_instances)
         self.output = ObjectOutput(node, model.models, mesh_uris(model))
         self._events = EventOutput(node)
@@ -132,8 +111,6 @@ class Parsing:
             'attributes': (PointCloud2, 'candidates/attributes')}, self.on_set,
             lambda: self.enabled)
         self.adapters = adapters_of(node)
-        # What stood on the table, and what of it the objects left unexplained.
-        self._explained: tuple[tuple[Any, ...], Float64Array] | None = None
         # Monotonic seconds of the result that stands; None: there is none.
         self._answered: float | None = None
         node.steady_timer(0.5, self._on_timer)
@@ -180,10 +157,8 @@ class Parsing:
         self._tracker.config = self._hidden.config = node.config
         ids, objects = self._tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
-        seen, observation = observation, observation.in_target_frame()
-        left = self._left(seen, observation, objects)
-        found = len(ids)
-        parsed, ids = self._hidden.update(stamp_ns, parsed, ids, observation)
+        left, found = self._leftover.of(observation, objects), len(ids)
+        parsed, ids = self._hidden.update(stamp_ns, parsed, ids, observation.in_target_frame())
         self._tracker.hold(ids, stamp_ns)
         events = self._log.update(ids, parsed.objects, parsed.hidden_s)
         scene = detected_scene(parsed, ids, self.models, stamp_ns, frame,
@@ -198,24 +173,17 @@ class Parsing:
                             hidden=len(ids) - found, age_s=age_s,
                             energy=float(parsed.energy.total))
 
-    def _left(self, seen: Observation, observation: Observation,
-              objects: Candidates) -> Float64Array:
-        """
-        Return the points (n, 3) that no object explains.
-
-        :param seen: what came; `observation` the same in the target frame.
-        """
-        key = seen, objects.translation, objects.rotation_xyzw, objects.size
-        if self._explained is None or self._explained[0][0] is not seen or not all(
-                map(np.array_equal, key[1:], self._explained[0][1:])):
-            self._explained = key, unexplained_points(observation, objects, self.models)
-        return self._explained[1]
+    def stop(self) -> None:
+        """Give up what runs in the background, and retract the result."""
+        self._following.give_up()
+        self.retract()
 
     def retract(self) -> None:
         """Publish that nothing is known any more; objects that return in time keep their ids."""
         self._answered = None
         self._hidden.forget()
         self._log.forget()
+        self._tracker.retract()
         now = self._node.now_ns(), self._node.config.target_frame
         self.output.clear(*now)
         clear_all(self._node, self.adapters, *now)

@@ -74,15 +74,3 @@ def test_events_are_published_where_something_happened(bench, live):
     assert [(e['event'], e['category']) for e in told['events']] == [
         ('taken', 'box'), ('taken', 'can')]
     assert np.isfinite([e['translation'] for e in told['events']]).all()
-
-
-def test_a_full_parse_is_due_after_its_time(bench, make_chain):
-    stages, send = make_chain(parameters={**FOLLOWS, 3: {'incremental': True,
-                                                         'full_every_s': 0.001}})
-    answers = bench.hear(PoseArray, 'objects/poses', qos('objects/poses'))
-    send()
-    assert bench.spin(lambda: answers)
-    stages.given.clear()
-    send()
-    assert bench.spin(lambda: len(answers) == 2)
-    assert 'propose' in stages.given and 'parse' not in stages.given    # it is revised

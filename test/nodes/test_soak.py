@@ -168,14 +168,20 @@ def test_hundreds_of_sets_with_drop_outs_and_refusals_through_the_chain(bench, m
     assert np.median(np.diff(held_by)[1:]) < 20, held_by
 
 
-@pytest.mark.slow
-def test_the_chain_of_processes_does_not_grow(repository, cheap, monkeypatch, tmp_path):
-    from hooc_perception.benchmark.soak import soak, write_plot
-    from hooc_perception.chain import CHAIN
+@pytest.fixture
+def unset(monkeypatch):
+    """Take away what the environment says about ROS, for processes of their own."""
     for name in ('ROS_DOMAIN_ID', 'ROS_AUTOMATIC_DISCOVERY_RANGE',
                  environment.TRANSPORTS_VARIABLE, *environment.FAST_DDS_VARIABLES):
         monkeypatch.setenv(name, '')
         monkeypatch.delenv(name)
+
+
+@pytest.mark.slow
+def test_the_chain_of_processes_does_not_grow(repository, cheap, unset, tmp_path):
+    from hooc_perception.benchmark.soak import soak
+    from hooc_perception.benchmark.soak_result import write_plot
+    from hooc_perception.chain import CHAIN
     common = {'model': str(repository / 'models' / 'demo'), 'profile': 'fast'}
     parameters = {name: {**common, **cheap.get(name, {})} for name in CHAIN}
     parameters['ingestion_node']['camera_timeout_s'] = 1.0
@@ -189,3 +195,24 @@ def test_the_chain_of_processes_does_not_grow(repository, cheap, monkeypatch, tm
     assert max(grown.values()) < 40, grown
     write_plot(tmp_path / 'soak.png', result)
     assert (tmp_path / 'soak.png').stat().st_size > 5000
+
+
+@pytest.mark.slow
+def test_every_change_of_a_table_is_answered_and_ids_stay(repository, unset):
+    """The whole chain as processes, with full parses in the background."""
+    from hooc_perception.benchmark.changing_table import ChangingTable
+    from hooc_perception.benchmark.soak import soak
+    from hooc_perception.chain import CHAIN, PARSING
+    from hooc_perception.trained.folder import load_model_folder
+    model = repository / 'models' / 'demo'
+    folder = load_model_folder(model)
+    table = ChangingTable(folder.models, folder.cameras, np.random.default_rng(3))
+    parameters = {name: {'model': str(model), 'profile': 'fast'} for name in CHAIN}
+    parameters[PARSING].update(max_instances=2, full_every_s=5.0)
+    result = soak(table, parameters, 60.0)
+    changes = result.changes
+    assert result.deaths == 0 and len(changes.followed) >= 2
+    # The last change may have come just before the end.
+    assert not changes.lost and all(f.answers for f in changes.followed[:-1]), changes
+    assert changes.swapped == 0 and changes.lost_ids == 0, changes
+    assert changes.found >= 0.95 * changes.true

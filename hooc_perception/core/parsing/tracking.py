@@ -25,9 +25,9 @@ SAME_SIZE = 0.25
 class TrackConfig(Config):
     """Parameters of the tracker."""
 
-    track_ttl_s: float = param(30.0, 'An object that is not found for longer than this is '
-                               'forgotten and gets a new id if it returns; 0: every result has '
-                               'new ids.', 's', 0.0, 3600.0, runtime=True)
+    track_ttl_s: float = param(30.0, 'An object that is missing in the results for longer than '
+                               'this is forgotten and gets a new id if it returns; 0: every '
+                               'result has new ids.', 's', 0.0, 3600.0, runtime=True)
     track_reach_m: float = param(
         0.15, 'An object within this distance of where one of its category was is the same. '
         'Farther away it is the same only if it is as large and the other one has vanished.', 'm',
@@ -69,10 +69,19 @@ class Tracker:
         self._things: dict[int, tuple[Float64Array, int]] = {}
         self._next_id = 1
         self._last_ns: int | None = None
+        # Stamp of the result that stands, and of the one before: what is in it is not missing,
+        # however long the next one takes.
+        self._standing_ns: int | None = None
+        self._before_ns: int | None = None
 
     def forget(self) -> None:
         """Forget all objects; their ids are not used again."""
         self._tracks, self._things, self._last_ns = {}, {}, None
+        self.retract()
+
+    def retract(self) -> None:
+        """Take all objects for missing from the last result on: it does not stand any more."""
+        self._standing_ns = None
 
     def hold(self, ids: UInt32Array, stamp_ns: int) -> None:
         """Let the time of objects that are known to be there, though hidden, begin anew."""
@@ -90,9 +99,9 @@ class Tracker:
         """
         if self._last_ns is not None and stamp_ns < self._last_ns:
             self.forget()
-        self._last_ns = stamp_ns
+        self._before_ns, self._standing_ns, self._last_ns = self._standing_ns, stamp_ns, stamp_ns
         self._tracks = {number: track for number, track in self._tracks.items()
-                        if stamp_ns - track.stamp_ns <= self.config.track_ttl_s * 1e9}
+                        if self._is_known(track.stamp_ns, stamp_ns)}
         objects = canonical_objects(objects, self.models)
         ids = np.zeros(len(objects), np.uint32)
         references: list[Float64Array | None] = [None] * len(objects)
@@ -119,7 +128,7 @@ class Tracker:
         They are matched by where they are; ids are unlike those of known objects.
         """
         self._things = {number: thing for number, thing in self._things.items()
-                        if stamp_ns - thing[1] <= self.config.track_ttl_s * 1e9}
+                        if self._is_known(thing[1], stamp_ns)}
         ids = np.zeros(len(unknown), np.uint32)
         if len(unknown) and self._things:
             numbers, known = list(self._things), [thing[0] for thing in self._things.values()]
@@ -134,6 +143,11 @@ class Tracker:
         for number, translation in zip(ids.tolist(), unknown.translation):
             self._things[number] = translation, stamp_ns
         return ids
+
+    def _is_known(self, seen_ns: int, stamp_ns: int) -> bool:
+        """Return whether what was last found at a time is remembered for the next result."""
+        ttl_s = self.config.track_ttl_s
+        return ttl_s > 0 and (seen_ns == self._before_ns or stamp_ns - seen_ns <= ttl_s * 1e9)
 
     def _carried(self, objects: Candidates, ids: UInt32Array) -> list[tuple[int, int]]:
         """Return (row, id) of new objects that have vanished elsewhere, the likest first."""

@@ -68,6 +68,24 @@ def test_what_vanishes_comes_back_with_its_id_until_its_time_is_over(things):
     assert late[1] == b and late[0] not in (a, b)
 
 
+def test_the_time_until_the_next_result_does_not_count(things):
+    """A machine that stood still, or a parse that takes longer than track_ttl_s."""
+    tracker = Tracker(things, TrackConfig(track_reach_m=0.1, track_ttl_s=5.0))
+    can, box = (CAN, (0.1, 0, 0.06), up()), (BOX, (0, 0, 0.03), up())
+    (a, b), _ = tracker.update(0, found(things, can, box))
+    assert tracker.update(100 * S, found(things, can, box))[0].tolist() == [a, b]
+    # Carried meanwhile; and missing in one result, which is when its time begins.
+    away = CAN, (0.6, 0, 0.06), up()
+    assert tracker.update(200 * S, found(things, away, box))[0].tolist() == [a, b]
+    assert tracker.update(300 * S, found(things, box))[0].tolist() == [b]
+    assert tracker.update(400 * S, found(things, away, box))[0].tolist() == [b + 1, b]
+    # A result that was retracted does not stand.
+    tracker.retract()
+    assert tracker.update(404 * S, found(things, away, box))[0].tolist() == [b + 1, b]
+    tracker.retract()
+    assert tracker.update(500 * S, found(things, away, box))[0].tolist() == [b + 2, b + 3]
+
+
 def test_another_category_or_another_size_is_another_object(things):
     tracker = Tracker(things, TrackConfig(track_reach_m=0.1))
     can = found(things, (CAN, (0, 0, 0.06), up()))

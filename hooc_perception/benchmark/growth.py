@@ -1,8 +1,8 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""How processor time and memory of a scene grow with views, categories, objects and pixels."""
+"""How time and memory of a scene grow with views, categories, objects, pixels and changes."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 import ctypes
 from dataclasses import dataclass, replace
 import gc
@@ -10,17 +10,23 @@ from pathlib import Path
 import time
 from typing import Any, TypeAlias
 
+from hooc_perception.benchmark.live import views_without
 from hooc_perception.core.arrays import AnyArray
 from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.profiles import Profile
 from hooc_perception.core.profiles import profile as named_profile
+from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.types import DepthView, GenericModel
 from hooc_perception.errors import HoocError
 from hooc_perception.parser import Parser
 from hooc_perception.synthesis.rigs import ring
 from hooc_perception.synthesis.scatter import ScatterConfig
-from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
+from hooc_perception.synthesis.training_scenes import (
+    training_scene,
+    TrainingConfig,
+    TrainingScene,
+)
 from hooc_perception.trained.folder import ModelFolder
 import numpy as np
 
@@ -30,6 +36,12 @@ AXES: dict[str, Sequence[float]] = {
     'views': (1, 2, 3, 4, 5, 6), 'categories': (10, 25, 50, 100), 'objects': (5, 10, 20, 40),
     'pixels': (0.25, 0.5, 1.0, 2.0, 4.0)}
 WIDTH, HEIGHT, FOCAL = 512, 424, 366.0
+# Of the objects of the common scene, the share that is gone in a frame set that follows it.
+CHANGED = 'changed'
+SHARES = (0.0, 0.05, 0.1, 0.2, 0.4)
+# Frame sets without change before, so that the answer has settled.
+STILL = 4
+LABELS = {'pixels': 'pixels, times 512 x 424', CHANGED: 'share of the objects taken'}
 # Objects come from the first categories only, so that the scene stays when categories are added.
 PRESENT = 10
 SIZE_SPREAD = 0.15
@@ -93,9 +105,9 @@ def _resized(model: GenericModel, name: str, factor: float) -> GenericModel:
                    variants=tuple(_resized(v, name, factor) for v in model.variants))
 
 
-def scene_views(models: Sequence[GenericModel], views: int, objects: int, pixels: float,
-                seed: int) -> tuple[list[DepthView], int]:
-    """Return (DepthViews, number of objects) of a synthetic scene."""
+def synthetic_scene(models: Sequence[GenericModel], views: int, objects: int, pixels: float,
+                    seed: int) -> TrainingScene:
+    """Return a synthetic scene of the first categories."""
     side = float(np.sqrt(pixels))
     cameras = ring(stage_rng(seed, 'growth/rig', views), views, round(WIDTH * side),
                    round(HEIGHT * side), FOCAL * side)
@@ -103,19 +115,20 @@ def scene_views(models: Sequence[GenericModel], views: int, objects: int, pixels
     config = TrainingConfig(reshape_strength=1.0, scatter=ScatterConfig(
         objects_low=objects, objects_high=objects, pose='resting', crowding=0.6, tries=200,
         repeats=-(-objects // len(present))))
-    scene = training_scene(present, cameras, stage_rng(seed, 'growth/scene'), config)
-    return [DepthView(v.camera, v.depth) for v in scene.views], len(scene.objects)
+    return training_scene(present, cameras, stage_rng(seed, 'growth/scene'), config)
 
 
 def grow(folder: ModelFolder, profile: str | None = None, seed: int = 0,
-         axes: Mapping[str, Sequence[float]] | None = None,
+         axes: Mapping[str, Sequence[float]] | None = None, shares: Sequence[float] = SHARES,
          each: Callable[[list[Any]], Iterable[Any]] = iter) -> dict[str, list[Point]]:
     """
-    Return {axis: [Point]}; the common point is measured once.
+    Return {axis: [Point]}; the common point is measured once. CHANGED is another axis.
 
     :param folder: ModelFolder of a profile with the fused forest.
     :param profile: name of another profile than the folder's own.
     :param axes: {axis: values}, AXES by default.
+    :param shares: of the axis CHANGED: a frame set follows the common scene, without this share
+        of its objects.
     :param each: wraps the list of settings, for a progress bar.
     :raises HoocError: where the classifier is bound to a rig.
     """
@@ -130,7 +143,8 @@ def grow(folder: ModelFolder, profile: str | None = None, seed: int = 0,
     _measure(folder, chosen, {**BASE, 'views': 2, 'objects': 4, 'pixels': 0.25}, seed)
     points = {key: _measure(folder, chosen, distinct[key], seed)
               for key in each(sorted(distinct))}
-    return {axis: [points[_key(s)] for s in rows] for axis, rows in settings.items()}
+    grown = {axis: [points[_key(s)] for s in rows] for axis, rows in settings.items()}
+    return grown | {CHANGED: _followed(folder, chosen, shares, seed)} if shares else grown
 
 
 def _key(setting: Setting) -> tuple[tuple[str, float], ...]:
@@ -140,15 +154,55 @@ def _key(setting: Setting) -> tuple[tuple[str, float], ...]:
 
 def _measure(folder: ModelFolder, chosen: Profile, setting: Setting, seed: int) -> Point:
     """Return the Point of a setting."""
-    views, standing = scene_views(folder.models, int(setting['views']), int(setting['objects']),
-                                  setting['pixels'], seed)
-    models, classifier = with_categories(folder.models, folder.classifier,
-                                         int(setting['categories']),
-                                         stage_rng(seed, 'growth/sizes'))
-    parser = Parser(models, classifier, chosen)
+    scene = _scene(folder, setting, seed)
+    views = [DepthView(v.camera, v.depth) for v in scene.views]
+    parser = _parser(folder, chosen, setting, seed)
+    return _timed(lambda: parser.parse(views, seed), setting, len(scene.objects))
+
+
+def _followed(folder: ModelFolder, chosen: Profile, shares: Sequence[float],
+              seed: int) -> list[Point]:
+    """Return the Points of frame sets that follow the common scene, see `grow`."""
+    scene, parser = _scene(folder, BASE, seed), _parser(folder, chosen, BASE, seed)
+    meshes = [(o.vertices_world, o.faces) for o in scene.objects]
+    observation, rng = observe(scene.views), stage_rng(seed, 'growth/changed')
+
+    def seen(gone: Collection[int]) -> list[DepthView]:
+        return views_without(scene.views, observation, meshes, gone, rng)
+
+    last = None
+    for _ in range(1 + STILL):
+        last = parser.update(seen(()), last, seed)
+    # What only changes need is compiled before.
+    parser.update(seen((0,)), last, seed)
+    points = []
+    for share in shares:
+        count = round(share * len(meshes))
+        # The same objects and more.
+        gone = stage_rng(seed, 'growth/gone').permutation(len(meshes))[:count].tolist()
+        views = seen(gone)
+        points.append(_timed(lambda views=views: parser.update(views, last, seed),
+                             {**BASE, CHANGED: share}, len(meshes) - count))
+    return points
+
+
+def _scene(folder: ModelFolder, setting: Setting, seed: int) -> TrainingScene:
+    """Return the scene of a setting."""
+    return synthetic_scene(folder.models, int(setting['views']), int(setting['objects']),
+                           setting['pixels'], seed)
+
+
+def _parser(folder: ModelFolder, chosen: Profile, setting: Setting, seed: int) -> Parser:
+    """Return the Parser of a setting."""
+    return Parser(*with_categories(folder.models, folder.classifier, int(setting['categories']),
+                                   stage_rng(seed, 'growth/sizes')), chosen)
+
+
+def _timed(work: Callable[[], Any], setting: Setting, standing: int) -> Point:
+    """Return the Point of work that returns a Scene."""
     _reset_peak()
     start = time.process_time()
-    parsed = parser.parse(views, seed).parsed
+    parsed = work().parsed
     seconds = time.process_time() - start
     return Point(setting, seconds, _peak_mb(), standing, len(parsed.pool), len(parsed.objects))
 
@@ -191,12 +245,13 @@ def write_plot(path: str | Path, grown: Mapping[str, Sequence[Point]], title: st
                 ('cpu_s', 'processor seconds', '#3b6fb6'), ('peak_mb', 'peak MB', '#d9822b'))):
             ax = axes[row, column]
             ax.plot(n, [getattr(p, what) for p in points], 'o-', color=colour)
-            ax.axvline(BASE[axis], color='#6b7280', lw=0.8, ls=':')
+            if axis in BASE:
+                ax.axvline(BASE[axis], color='#6b7280', lw=0.8, ls=':')
             ax.grid(alpha=0.3)
             ax.spines[['top', 'right']].set_visible(False)
             if column == 0:
                 ax.set_ylabel(label)
-        axes[1, column].set_xlabel('pixels, times 512 x 424' if axis == 'pixels' else axis)
+        axes[1, column].set_xlabel(LABELS.get(axis, axis))
     for ax in axes[:, 0]:
         # Last, because a limit that is set stays, whatever is drawn later into its row.
         ax.set_ylim(0, None)

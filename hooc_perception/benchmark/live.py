@@ -2,15 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Incremental parsing beside a parse of each frame set, on the bench scene."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from time import perf_counter as now
 from typing import Any, TypeVar
 
 from hooc_perception.benchmark.scene import BenchScene
+from hooc_perception.core.arrays import AnyArray
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.render import render_depth
-from hooc_perception.core.types import DepthView
+from hooc_perception.core.types import DepthView, Observation, RectifiedView
 from hooc_perception.parser import Parser
 from hooc_perception.trained.folder import ModelFolder
 import numpy as np
@@ -44,11 +45,12 @@ def live_times(folder: ModelFolder, scene: BenchScene, seed: int = 0) -> list[Fo
     nothing: set[int] = set()
 
     def update(gone: set[int], previous: Any) -> tuple[Any, float]:
-        views = _views(scene, gone, rng)
+        views = views_without(scene.views, scene.observation, scene.meshes, gone, rng)
         return _timed(lambda: parser.update(views, previous, folder.seed))
 
-    _, whole = zip(*(_timed(lambda: parser.parse(_views(scene, nothing, rng), folder.seed))
-                     for _ in range(3)))
+    _, whole = zip(*(_timed(lambda: parser.parse(views_without(
+        scene.views, scene.observation, scene.meshes, nothing, rng), folder.seed))
+        for _ in range(3)))
     last, _ = update(nothing, None)
     still, taken, put = [], [], []
     for _ in range(STILL):
@@ -71,13 +73,20 @@ def _timed(work: Callable[[], T]) -> tuple[T, float]:
     return result, now() - start
 
 
-def _views(scene: BenchScene, gone: set[int], rng: np.random.Generator) -> Sequence[DepthView]:
-    """Return raw views of the scene without some of its objects, with new noise."""
+def views_without(given: Sequence[RectifiedView], observation: Observation,
+                  meshes: Sequence[tuple[AnyArray, AnyArray]], gone: Collection[int],
+                  rng: np.random.Generator) -> list[DepthView]:
+    """
+    Return raw views of a scene without some of its objects, with new noise.
+
+    :param given: the views with all objects; `observation` is what they show.
+    :param meshes: (vertices world, faces) of the objects; `gone` are indices into them.
+    """
     views = []
-    left = [mesh for k, mesh in enumerate(scene.meshes) if k not in gone]
-    for view, seen in zip(scene.views, scene.observation.views):
+    left = [mesh for k, mesh in enumerate(meshes) if k not in gone]
+    for view, seen in zip(given, observation.views):
         depth = view.depth.copy()
-        _, owner = render_depth(scene.meshes, view.camera)
+        _, owner = render_depth(meshes, view.camera)
         behind, _ = render_depth(left, view.camera)
         pixels = np.isin(owner, list(gone))
         depth[pixels] = np.fmin(behind, seen.background)[pixels]

@@ -32,7 +32,9 @@ def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagSc
             read: Iterable[Any], sequences: 'Sequence[RecordedSequence]',
             ) -> Iterator[tuple[Any, float]]:
     """
-    Yield, for each scene in order, (dict of the Scene with ids, seconds) or (HoocError, NaN).
+    Yield, for each scene in order, (dict of the Scene, seconds) or (HoocError, NaN).
+
+    The dict also has ids, events, and the stamp in ns from the start of the sequence.
 
     A frame set that cannot be parsed is left out of its sequence. Scenes that no sequence names
     are one sequence.
@@ -40,13 +42,14 @@ def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagSc
     :param scenes: see `in_time_order`.
     :param read: per scene (DepthViews, anything), or the HoocError that reading gave.
     """
+    from hooc_perception.core.parsing.events import EventLog
     from hooc_perception.core.parsing.tracking import Tracker
     from hooc_perception.io.scenes.results import with_ids
     from hooc_perception.io.scenes.sequences import PERIOD_S
     of_scene = {name: sequence for sequence in sequences for name in sequence.scenes}
     for sequence, frame_sets in groupby(zip(scenes, read), lambda one: of_scene.get(one[0].name)):
         period_s = PERIOD_S if sequence is None else sequence.period_s
-        tracker = Tracker(parser.models)
+        tracker, log = Tracker(parser.models), EventLog(parser.models)
         previous: Scene | None = None
         for number, (_, given) in enumerate(frame_sets):
             if isinstance(given, HoocError):
@@ -62,4 +65,6 @@ def updates(parser: 'Parser', seed: int, scenes: 'Sequence[RecordedScene | BagSc
             stamp_ns = round(number * period_s * 1e9)
             ids, _ = tracker.update(stamp_ns, result.parsed.objects)
             unknown_ids = tracker.update_unknown(stamp_ns, result.parsed.unknown)
-            yield with_ids(result.to_dict(), ids, unknown_ids), seconds
+            events = log.update(ids, result.parsed.objects, result.parsed.hidden_s)
+            yield with_ids(result.to_dict(), ids, unknown_ids) | {
+                'stamp_ns': stamp_ns, 'events': [event.to_dict() for event in events]}, seconds

@@ -14,8 +14,8 @@ from hooc_perception.errors import HoocError
 
 if TYPE_CHECKING:
     from hooc_perception.io.bags.reader import BagScene
+    from hooc_perception.supervisor.answers import FrameSetResult
     from hooc_perception.supervisor.bags import BagRunner
-    from hooc_perception.supervisor.collector import FrameSetResult
     from hooc_perception.trained.folder import ModelFolder
 
 # Upper limits of the node parameters `seed` and `wait_for_answer_s`.
@@ -50,7 +50,7 @@ def run(args: Namespace) -> int:
     from hooc_perception.cli.places import relative_place
     from hooc_perception.io.bags.reader import BagScene
     from hooc_perception.io.bags.sequences import frame_sets
-    from hooc_perception.io.scenes.results import scene_result, with_ids, write_results
+    from hooc_perception.io.scenes.results import write_results
     from hooc_perception.trained.folder import load_model_folder
     if not args.timeout > 0:
         raise HoocError(f'--timeout is {args.timeout:g}; give a positive number of seconds')
@@ -58,18 +58,15 @@ def run(args: Namespace) -> int:
     model = load_model_folder(args.model)
     bags = [BagScene(path) for path in bag_paths(args.bags)]
     check_bags(bags, args.record)
-    classes = [m.name for m in model.models]
     for bag in bags:
         if bag.info['categories']:
-            warn_of_gap(classes, bag.info['categories'], bag.path)
+            warn_of_gap([m.name for m in model.models], bag.info['categories'], bag.path)
     answers, failures, profile, seed = play(bags, args, model)
     # Per frame set of a sequence, or per bag: where it is recorded, and its result.
-    done = [(scene, bag, answer) for bag in bags if bag.name in answers
+    done = [(scene, answer) for bag in bags if bag.name in answers
             for scene, answer in zip(frame_sets(bag) or (bag,), answers[bag.name])]
-    entries = [with_ids(scene_result(
-        scene.name, answer.parsed, classes, answer.seconds, images=answer.images,
-        bag=relative_place(bag.path, args.out), **bag.world), answer.ids)
-        for scene, bag, answer in done]
+    entries = [entry for bag in bags if bag.name in answers
+               for entry in entries_of(bag, answers[bag.name], model, args.out)]
     if done:
         write_results(args.out, done[0][0].info['dataset'], entries, profile=profile, seed=seed,
                       model=relative_place(args.model, args.out))
@@ -77,7 +74,7 @@ def run(args: Namespace) -> int:
         print(f'{args.out}: {found} objects in {len(entries)} '
               f'scene{"s" if len(entries) != 1 else ""}')
         if args.report:
-            write_report(args, done, entries, model,
+            write_report(args, bags, done, entries, model,
                          f'Profile {profile}, seed {seed}, through the nodes')
     return tell_failures(failures)
 
@@ -218,14 +215,34 @@ def results_of(runner: 'BagRunner', bag: 'BagScene') -> 'list[FrameSetResult]':
     return results
 
 
-def write_report(args: Namespace, done: 'Sequence[tuple[BagScene, BagScene, FrameSetResult]]',
+def entries_of(bag: 'BagScene', answers: 'Sequence[FrameSetResult]', model: 'ModelFolder',
+               out: Path) -> list[dict[str, Any]]:
+    """Return the results entries of a bag, with events if it is a sequence."""
+    from hooc_perception.cli.places import relative_place
+    from hooc_perception.io.bags.sequences import frame_sets
+    from hooc_perception.supervisor.answers import events_between
+    names = [scene.name for scene in frame_sets(bag) or (bag,)]
+    entries = [answer.entry(name, [m.name for m in model.models],
+                            bag=relative_place(bag.path, out), **bag.world)
+               for name, answer in zip(names, answers)]
+    if bag.info['sequence'] is None:
+        return entries
+    return [entry | {'events': events}
+            for entry, events in zip(entries, events_between(answers, model.models))]
+
+
+def write_report(args: Namespace, bags: 'Iterable[BagScene]',
+                 done: 'Sequence[tuple[BagScene, FrameSetResult]]',
                  entries: Sequence[dict[str, Any]], model: 'ModelFolder', note: str) -> None:
     """Write DIR/report.html from what the nodes have published."""
     from hooc_perception.evaluation.report.page import write_report as write_page
     from hooc_perception.evaluation.report.scene import report_scene
+    from hooc_perception.evaluation.report.sequence import in_sequences
+    from hooc_perception.io.bags.sequences import recorded_sequence
     models = {m.name: m for m in model.models}
     scenes = [report_scene(entry, scene.views(answer.images), models, scene.truth,
                            probabilities=answer.probabilities, pool=answer.parsed.pool)
-              for entry, (scene, _, answer) in zip(entries, done)]
+              for entry, (scene, answer) in zip(entries, done)]
     title = f'Objects on the table: {done[0][0].info["dataset"]}'
-    print(write_page(args.report, scenes, title, [note]))
+    sequences = [sequence for bag in bags if (sequence := recorded_sequence(bag))]
+    print(write_page(args.report, in_sequences(scenes, sequences), title, [note]))

@@ -4,55 +4,28 @@
 
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass
 import json
 from typing import Any, TypeAlias
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import PoseArray
 from hooc_perception.chain import INGESTION
-from hooc_perception.core.arrays import UInt32Array
-from hooc_perception.core.types import Candidates, Energy, ParsedScene, PixelProbabilities
 from hooc_perception.ros.messages.conversions import nanoseconds
-from hooc_perception.ros.messages.point_clouds import cloud_rows
-from hooc_perception.ros.messages.stages import (
-    candidates_from_messages,
-    probabilities_from_message,
-)
-from hooc_perception.ros.messages.unknown import unknown_from_messages
 from hooc_perception.ros.qos import qos
-import numpy as np
+from hooc_perception.supervisor.answers import (
+    frame_set_result,
+    FrameSetResult,
+    images_of,
+    OBJECT_PARTS,
+)
 from rclpy.node import Node
 from rclpy.subscription import Subscription
 from sensor_msgs.msg import Image, PointCloud2
 from std_msgs.msg import String
 
-
-@dataclass(frozen=True)
-class FrameSetResult:
-    """
-    The result of the nodes for one frame set.
-
-    :ivar stamp_ns: stamp of the frame set.
-    :ivar parsed: its pool holds the first proposals, not those of later rounds.
-    :ivar seconds: from the arrival of the last depth image to the publication of the objects.
-    :ivar probabilities: None if they were not received.
-    :ivar images: {camera: index of its image in the bag, from 0 on}.
-    :ivar ids: (n,) uint32 of the objects.
-    """
-
-    stamp_ns: int
-    parsed: ParsedScene
-    seconds: float
-    probabilities: PixelProbabilities | None
-    images: dict[str, int]
-    ids: UInt32Array
-
-
 _INGESTION = f'{INGESTION}: '
 _PARTS: dict[str, Any] = {
-    'objects/poses': PoseArray, 'objects/attributes': PointCloud2, 'scene/summary': String,
-    'objects/unknown': PoseArray, 'objects/unknown_attributes': PointCloud2,
+    **OBJECT_PARTS,
     'candidates/poses': PoseArray, 'candidates/attributes': PointCloud2,
     'pixels/probabilities': PointCloud2}
 # Of a message: rclpy's annotation of callbacks leaves it out.
@@ -195,37 +168,13 @@ class Collector:
 
     def result(self, stamp_ns: int) -> FrameSetResult | None:
         """Return the result of the frame set of a stamp, None while parts are missing."""
-        topics = ('objects/poses', 'objects/attributes', 'scene/summary', 'objects/unknown',
-                  'objects/unknown_attributes')
-        if any(stamp_ns not in self._parts[topic] for topic in topics):
+        if any(stamp_ns not in self._parts[topic] for topic in OBJECT_PARTS):
             return None
-        poses, attributes, summary, *unknown = (self._parts[topic][stamp_ns] for topic in topics)
-        found = candidates_from_messages(poses, attributes)
-        rows = cloud_rows(attributes)
-        pool = self._pool(stamp_ns)
-        pool = found if pool is None else pool
-        energy = summary['energy']
-        parsed = ParsedScene(
-            found, Energy(energy['depth'], energy['probability'], energy['overlap']),
-            rows['visible_ratio'].copy(), rows['residual_m'].copy(), rows['energy_delta'].copy(),
-            rows['n_views'].copy(), pool, converged=summary['converged'],
-            seconds=summary['seconds'], sigma_t=rows['sigma_t'].copy(),
-            sigma_r=rows['sigma_r'].copy(), unknown=unknown_from_messages(*unknown))
-        probabilities = self._parts['pixels/probabilities'].get(stamp_ns)
         arrived = max((t for s, t in self._arrived.items() if s >= stamp_ns), default=0)
-        return FrameSetResult(
-            stamp_ns, parsed, max(0.0, (self._published[stamp_ns] - arrived) * 1e-9),
-            None if probabilities is None else probabilities_from_message(probabilities),
-            self.images_of(stamp_ns), rows['id'].astype(np.uint32))
+        parts = {topic: kept[stamp_ns] for topic, kept in self._parts.items() if stamp_ns in kept}
+        return frame_set_result(stamp_ns, parts, max(
+            0.0, (self._published[stamp_ns] - arrived) * 1e-9), self.images_of(stamp_ns))
 
     def images_of(self, stamp_ns: int) -> dict[str, int]:
         """Return {camera: index of its image} of a frame set: the first ones not before it."""
-        return {camera: sum(stamp < stamp_ns for stamp in stamps)
-                for camera, stamps in self.image_stamps.items()}
-
-    def _pool(self, stamp_ns: int) -> Candidates | None:
-        poses = self._parts['candidates/poses'].get(stamp_ns)
-        attributes = self._parts['candidates/attributes'].get(stamp_ns)
-        if poses is None or attributes is None:
-            return None
-        return candidates_from_messages(poses, attributes)
+        return images_of(stamp_ns, self.image_stamps)

@@ -2,13 +2,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Record the topics of the chain while a bag is played."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 import time
 from typing import Any
 
 from geometry_msgs.msg import PoseArray, TransformStamped
+from hooc_perception.io.bags.files import iter_messages
 from hooc_perception.io.bags.raw_writer import RawBagWriter
+from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.io.bags.scene_info import SUFFIX
 from hooc_perception.ros.health.silence import type_name
 from hooc_perception.ros.qos import qos
 from rclpy.node import Node
@@ -26,17 +29,26 @@ _KINDS: dict[str, Any] = {
     'pixels/<camera>/labels': Image, 'candidates/poses': PoseArray,
     'candidates/attributes': PointCloud2, 'objects/poses': PoseArray,
     'objects/attributes': PointCloud2, 'objects/labels': String, 'objects/markers': MarkerArray,
-    'scene/unexplained': PointCloud2, 'scene/summary': String}
+    'objects/unknown': PoseArray, 'objects/unknown_attributes': PointCloud2,
+    'objects/events': String, 'scene/unexplained': PointCloud2, 'scene/summary': String}
 
 
 class Recorder:
     """Subscribe to all topics of the chain and write their messages as they arrive."""
 
-    def __init__(self, node: Node, path: Path, cameras: Iterable[str]) -> None:
-        """Start to record; HoocError if the bag exists already."""
+    def __init__(self, node: Node, path: Path, bag: BagScene) -> None:
+        """
+        Start to record what follows from a bag, and what the bag says of its scene.
+
+        :raises HoocError: if there is a bag at `path` already.
+        """
         self._node, self._writer = node, RawBagWriter(path)
         self._subscriptions: list[Subscription] = []
-        self._began, cameras = time.time_ns(), tuple(cameras)
+        self._began, cameras = time.time_ns(), [camera.name for camera in bag.cameras]
+        # No node publishes it.
+        for message in iter_messages(bag.path, [t for t in bag.topics if t.endswith(SUFFIX)]):
+            self._writer.write(message.topic.name, message.topic.type_name, message.data,
+                               self._began, latched=True)
         for row, kind in _KINDS.items():
             for camera in cameras if '<camera>' in row else ('',):
                 self._subscribe(row, kind, row.replace('<camera>', camera))

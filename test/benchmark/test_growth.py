@@ -37,9 +37,9 @@ def test_categories_are_left_out_or_copied_in_another_size(folder):
 
 
 def test_the_scene_is_the_same_whatever_the_categories_and_scales_with_pixels(folder):
-    small, standing = growth.scene_views(folder.models, 2, 6, 0.25, 0)
-    large, _ = growth.scene_views(folder.models[:10], 2, 6, 1.0, 0)
-    assert standing == 6 and len(small) == 2
+    scene = growth.synthetic_scene(folder.models, 2, 6, 0.25, 0)
+    small, large = scene.views, growth.synthetic_scene(folder.models[:10], 2, 6, 1.0, 0).views
+    assert len(scene.objects) == 6 and len(small) == 2
     assert large[0].depth.size == pytest.approx(4 * small[0].depth.size, rel=0.01)
     # Every second ray of the larger image is about one of the smaller; noise differs.
     coarse = large[0].depth[1::2, 1::2][:small[0].depth.shape[0], :small[0].depth.shape[1]]
@@ -50,13 +50,33 @@ def test_one_thing_changes_and_the_common_point_is_measured_once(folder, monkeyp
     monkeypatch.setattr(growth, 'BASE', {'views': 2, 'categories': 10, 'objects': 3,
                                          'pixels': 0.25})
     asked = []
-    grown = growth.grow(folder, axes={'views': (1, 2), 'categories': (2, 10)},
+    grown = growth.grow(folder, axes={'views': (1, 2), 'categories': (2, 10)}, shares=(),
                         each=lambda rows: asked.extend(rows) or rows)
     assert len(asked) == 3 and grown['views'][1] is grown['categories'][1]
     assert [p.setting['views'] for p in grown['views']] == [1, 2]
     for points in grown.values():
         for p in points:
             assert p.cpu_s > 0 and p.peak_mb > 50 and p.standing == 3 and p.candidates > 0
+
+
+def test_a_frame_set_that_follows_lacks_a_share_of_the_objects(folder, monkeypatch):
+    monkeypatch.setattr(growth, 'BASE', {'views': 2, 'categories': 10, 'objects': 4,
+                                         'pixels': 0.25})
+    seen, taken = [], []
+    parser = growth.Parser
+    monkeypatch.setattr(parser, 'update', lambda self, views, last, seed: seen.append(
+        (views, last)) or parser.parse(self, views, seed))
+    without = growth.views_without
+    monkeypatch.setattr(growth, 'views_without', lambda *args: taken.append(
+        args[3]) or without(*args))
+    points = growth.grow(folder, axes={'views': (2,)}, shares=(0.0, 0.5))[growth.CHANGED]
+    assert [p.standing for p in points] == [4, 2] and all(p.cpu_s > 0 for p in points)
+    # Both follow the same settled answer.
+    assert seen[-1][1] is seen[-2][1] and seen[0][1] is None and seen[1][1] is not None
+    assert len(taken[-1]) == 2 and not taken[-2]
+    nearer = [(a.depth - b.depth)[a.depth < b.depth - 0.03].size
+              for a, b in zip(seen[-2][0], seen[-1][0])]
+    assert sum(nearer) > 30
 
 
 def test_exponent_is_the_slope_of_the_logarithms():
@@ -73,5 +93,6 @@ def test_a_model_bound_to_a_rig_is_refused(folder):
 def test_the_plot_is_written(tmp_path):
     points = [growth.Point({**growth.BASE, 'views': n}, 2.0 * n, 300.0, 20, 100, 18)
               for n in (1, 2)]
-    growth.write_plot(tmp_path / 'a' / 'growth.png', {'views': points}, 'title')
+    growth.write_plot(tmp_path / 'a' / 'growth.png', {'views': points, growth.CHANGED: [
+        growth.Point({**growth.BASE, growth.CHANGED: 0.1}, 0.5, 300.0, 18, 100, 16)]}, 'title')
     assert (tmp_path / 'a' / 'growth.png').read_bytes()[:4] == b'\x89PNG'

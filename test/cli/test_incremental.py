@@ -30,7 +30,8 @@ class Following:
             raise HoocError('it is too dark')
         return SimpleNamespace(
             views=views, to_dict=lambda: {'objects': []},
-            parsed=SimpleNamespace(objects=Candidates.empty(), unknown=UnknownObjects.empty()))
+            parsed=SimpleNamespace(objects=Candidates.empty(), unknown=UnknownObjects.empty(),
+                                   hidden_s=None))
 
 
 def results(parser, unreadable=()):
@@ -43,7 +44,11 @@ def results(parser, unreadable=()):
 
 def test_frame_sets_follow_in_the_order_of_time_and_sequences_begin_anew():
     parser = Following()
-    assert [name for name, _ in results(parser)] == ['d', 'a', 'e', 'b', 'c']
+    done = results(parser)
+    assert [name for name, _ in done] == ['d', 'a', 'e', 'b', 'c']
+    # Scenes of no sequence come at the usual pace.
+    assert [entry['stamp_ns'] for _, entry in done] == [0, 5e8, 0, 5e8, 0]
+    assert all(entry['events'] == [] for _, entry in done)
     assert parser.followed == [('d', None), ('a', 'd'), ('e', None), ('b', 'e'), ('c', None)]
 
 

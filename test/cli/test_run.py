@@ -11,6 +11,7 @@ from hooc_perception.cli.main import main
 from hooc_perception.core.types import Candidates, Energy, ParsedScene
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.reader import BagScene
+from hooc_perception.supervisor.answers import FrameSetResult
 import numpy as np
 import pytest
 
@@ -72,8 +73,8 @@ def answer():
     parsed = ParsedScene(Candidates.empty(), Energy(0.5, 0.2, 0.0), none, none, none, none,
                          Candidates.empty())
     images = {camera.name: 0 for camera in BagScene(BAG).cameras}
-    return SimpleNamespace(parsed=parsed, seconds=1.0, images=images, probabilities=None,
-                           ids=np.zeros(0, np.uint32))
+    return FrameSetResult(5, parsed, 1.0, None, images, np.zeros(0, np.uint32),
+                          np.zeros(0, np.uint32))
 
 
 @pytest.mark.skipif(not (BAG / 'metadata.yaml').is_file(), reason='no bundled scene')

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A small rendered scene set with a truth, and results made from it."""
 
+import importlib.util
+from pathlib import Path
+
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera
 from hooc_perception.evaluation.errors import world_mesh
@@ -127,3 +130,13 @@ def posed_truths():
 def make_mesh(models):
     """Return a function: PosedObject -> (vertices, faces) in the world."""
     return lambda thing: world_mesh(thing, models[thing.category])
+
+
+@pytest.fixture(scope='session')
+def browser_module():
+    """Return browser.py."""
+    spec = importlib.util.spec_from_file_location('browser',
+                                                  Path(__file__).with_name('browser.py'))
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module

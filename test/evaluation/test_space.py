@@ -5,7 +5,6 @@
 import base64
 from dataclasses import replace
 import hashlib
-import importlib.util
 import json
 from pathlib import Path
 import re
@@ -22,26 +21,18 @@ import numpy as np
 import pytest
 
 
-@pytest.fixture(scope='module')
-def browser_module():
-    """Return browser.py."""
-    spec = importlib.util.spec_from_file_location('browser',
-                                                  Path(__file__).with_name('browser.py'))
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 @pytest.fixture
 def page(scene, tmp_path):
     return write_report(tmp_path / 'report.html', [scene])
 
 
 def data_of(page):
-    """Return (data of the first scene, meshes) as the script reads them."""
+    """Return (data of the only frame set of the first scene, meshes) as the script reads them."""
     text = page.read_text()
     found = re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', text, re.S)
-    return json.loads(found[0]), json.loads(found[-1])
+    space = json.loads(found[0])
+    step, = space.pop('steps')
+    return step | space, json.loads(found[-1])
 
 
 def numbers(text, kind):
@@ -139,7 +130,7 @@ def test_things_of_no_category_are_told_apart(tiny, models, truth_results, tmp_p
 
 def test_the_first_view_shows_everything(page, scene):
     data = data_of(page)[0]
-    space = Space.of(ShownScene.of(scene), palette_of([scene]))
+    space = Space.of([ShownScene.of(scene)], palette_of([scene]))
     np.testing.assert_allclose(space.view.eye, data['view']['eye'])
     camera = space.view.camera((1600, 900))
     shown = np.concatenate([*points_of(data['cloud']).values(),
@@ -157,7 +148,8 @@ def test_the_first_view_shows_everything(page, scene):
             inverse(camera.T_world_camera), np.array([thing.translation])))
         near = still[int(y) - 6:int(y) + 7, int(x) - 6:int(x) + 7].reshape(-1, 3).astype(float)
         hue = near / np.maximum(np.linalg.norm(near, axis=1, keepdims=True), 1)
-        mine = np.array(space.colours[k]) / np.linalg.norm(space.colours[k])
+        mine = np.array(space.steps[0].colours[k], float)
+        mine /= np.linalg.norm(mine)
         assert (hue @ mine > 0.99).any()
 
 

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip('rclpy')
 
 S = 10 ** 9
-BAG = SimpleNamespace(name='10_1', depth_topics={'a': '/a', 'b': '/b'},
+BAG = SimpleNamespace(name='10_1', info={'sequence': None}, depth_topics={'a': '/a', 'b': '/b'},
                       topics={'/a': SimpleNamespace(count=2), '/b': SimpleNamespace(count=2)})
 REFUSED = 'a: it holds no reading; the image is dropped'
 
@@ -82,8 +82,8 @@ class Script:
                 if name != but:
                     self.report(name, 'node')
 
-    def listen(self):
-        return self.runner._collect(BAG, 0)
+    def listen(self, bag=BAG):
+        return self.runner._collect(bag, 0)
 
 
 def time(stamp_ns):
@@ -109,6 +109,17 @@ def test_cameras_that_end_together_are_answered_at_once(script):
     script.answer(1 * S)
     script.answer(2 * S)
     assert script.listen().stamp_ns == 2 * S
+
+
+def test_the_last_images_of_a_sequence_are_waited_for(script):
+    play(script, [1 * S], [1 * S])
+    script.answer(1 * S)
+    # The news that the bag is played to its end has overtaken them.
+    script.image('a', 2 * S)
+    script.image('b', 2 * S)
+    script.answer(2 * S)
+    told = {'sequence': {'frame_sets': {'first': None, 'second': None}}}
+    assert script.listen(SimpleNamespace(**{**vars(BAG), 'info': told})).stamp_ns == 2 * S
 
 
 def test_the_newest_answer_is_taken_where_one_camera_goes_on_alone(script):

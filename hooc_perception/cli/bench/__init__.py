@@ -11,7 +11,7 @@ HELP = ('Measure speed and memory, how they grow, and what damaged input and lon
         '`hooc bench` alone is `hooc bench speed`.')
 TOOLS = {
     'speed': 'speed and memory of every stage, as ratios to named baselines in the same run',
-    'growth': 'how time and memory grow with views, categories, objects and pixels',
+    'growth': 'how time and memory grow with views, categories, objects, pixels and changes',
     'fuzz': 'feed damaged bags, messages and models to everything that reads them',
     'soak': 'run the nodes for a long time while cameras drop out and return',
 }

@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from hooc_perception.benchmark.growth import Point
 
 HELP = ('Measure how processor time and memory of a scene grow with the number of views, '
-        'categories, objects and pixels, one at a time.')
+        'categories, objects and pixels, one at a time, and those of a frame set that follows '
+        'another with the share of the objects that is gone.')
 
 
 def add_arguments(parser: ArgumentParser) -> None:
@@ -53,13 +54,14 @@ def run(args: Namespace) -> None:
 
 def _print(grown: Mapping[str, Sequence['Point']], profile: str) -> None:
     """Print a row for every point and how each axis grows."""
-    from hooc_perception.benchmark.growth import exponent
+    from hooc_perception.benchmark.growth import CHANGED, exponent
     from hooc_perception.evaluation.tables import Table, to_text
     rows, notes = [], []
     for axis, points in grown.items():
         rows += [(f'{axis} {p.setting[axis]:g}', f'{p.cpu_s:.2f}', f'{p.peak_mb:.0f}',
                   p.standing, p.candidates, p.found) for p in points]
-        notes.append(f'{axis}: time as n^{exponent(points, axis, "cpu_s"):.2f}')
+        if axis != CHANGED:
+            notes.append(f'{axis}: time as n^{exponent(points, axis, "cpu_s"):.2f}')
     print(to_text(Table(
         f'Growth of time and memory, profile {profile}',
         ('', 'CPU s', 'peak MB', 'standing', 'candidates', 'found'), tuple(rows),

@@ -15,7 +15,10 @@ import numpy as np
 
 # As core.parsing.unexplained: a pixel within this distance of the composed objects is explained.
 EXPLAINED_M = 0.02
-MAX_FOREGROUND, MAX_TABLE = 24000, 12000
+# Points of the page: of one scene, and of all frame sets of a sequence together.
+MAX_POINTS, MAX_SEQUENCE = 36_000, 400_000
+# One point is kept in each cube of this size; twice the size of the table.
+VOXELS_M = (0.002, 0.003, 0.004, 0.006, 0.008, 0.012, 0.016, 0.024, 0.032)
 # Around all that stands: of the table, and below and above.
 BORDER_M = (0.1, 0.1, 0.02)
 # What is farther from every object is the room behind the table.
@@ -91,15 +94,36 @@ def extent_of(groups: Sequence[PointGroup],
     return low - BORDER_M, high + BORDER_M
 
 
-def thinned(groups: Sequence[PointGroup], low: AnyArray, high: AnyArray) -> list[PointGroup]:
-    """Return the groups with their points in a box, few enough for a page."""
-    inside = [np.flatnonzero(((g.points >= low) & (g.points <= high)).all(1)) for g in groups]
-    total = {is_table: sum(len(rows) for g, rows in zip(groups, inside)
-                           if (g.kind == 'table') == is_table) for is_table in (True, False)}
-    out = []
-    for group, rows in zip(groups, inside):
-        is_table = group.kind == 'table'
-        step = -(-total[is_table] // (MAX_TABLE if is_table else MAX_FOREGROUND)) or 1
-        out.append(PointGroup(group.camera, group.kind, group.points[rows[::step]],
-                              group.rgb[rows[::step]]))
-    return out
+def inside(groups: Sequence[PointGroup], low: AnyArray, high: AnyArray) -> list[PointGroup]:
+    """Return the groups with their points in a box."""
+    return [_taken(g, np.flatnonzero(((g.points >= low) & (g.points <= high)).all(1)))
+            for g in groups]
+
+
+def thinned(steps: Sequence[Sequence[PointGroup]]) -> tuple[list[list[PointGroup]], float]:
+    """
+    Return (the groups of every frame set with few enough points for a page, voxel size, m).
+
+    In each cube of the voxel size, the first point of each camera and kind is kept.
+    """
+    limit = min(MAX_POINTS * len(steps), MAX_SEQUENCE)
+    thin, voxel_m = list[list[PointGroup]](), 0.0
+    for voxel_m in VOXELS_M:
+        thin = [[_thin(g, voxel_m * (2 if g.kind == 'table' else 1)) for g in groups]
+                for groups in steps]
+        if sum(len(g.points) for groups in thin for g in groups) <= limit:
+            break
+    return thin, voxel_m
+
+
+def _thin(group: PointGroup, voxel_m: float) -> PointGroup:
+    """Return a group with one point in each cube."""
+    cells = np.floor(group.points / voxel_m).astype(np.int64)
+    # Cells of a box of points are far fewer than 2^20 along each axis.
+    keys = (cells << np.array([0, 20, 40])).sum(1)
+    return _taken(group, np.sort(np.unique(keys, return_index=True)[1]))
+
+
+def _taken(group: PointGroup, rows: AnyArray) -> PointGroup:
+    """Return some points of a group."""
+    return PointGroup(group.camera, group.kind, group.points[rows], group.rgb[rows])

@@ -37,15 +37,21 @@ def colours(names: Iterable[str]) -> dict[str, RGB]:
     return out
 
 
-def instance_colours(objects: Iterable[PosedObject], palette: Palette) -> list[RGB]:
-    """Return one (r, g, b) per object: that of its category, varied for further instances."""
-    out: list[RGB] = []
+def instance_colours(objects: Sequence[PosedObject], palette: Palette) -> list[RGB]:
+    """
+    Return one (r, g, b) per object: that of its category, varied for further instances.
+
+    Instances with ids are varied in the order of their ids, so that they keep their colours while
+    they stay.
+    """
+    out: list[RGB] = [(0, 0, 0)] * len(objects)
     count: dict[str, int] = {}
-    for thing in objects:
+    for i in sorted(range(len(objects)), key=lambda i: objects[i].id or 0):
+        thing = objects[i]
         k = count[thing.category] = count.get(thing.category, -1) + 1
         rgb = np.array(palette[thing.category])
         red, green, blue = (rgb * (1, 0.7)[k % 2] + 70 * (k % 3 == 2)).clip(0, 255).astype(int)
-        out.append((int(red), int(green), int(blue)))
+        out[i] = int(red), int(green), int(blue)
     return out
 
 

@@ -1,6 +1,6 @@
 # Copyright 2026 The hooc_perception authors
 # SPDX-License-Identifier: Apache-2.0
-"""The rows of the report's tables: estimates, missed objects, rejected candidates."""
+"""The rows of the report's tables: estimates, missed objects, candidates, events."""
 
 from typing import Any
 
@@ -29,7 +29,7 @@ def object_rows(scene: ReportScene, palette: Palette) -> list[dict[str, Any]]:
             verdict = ('ok' if score.localized else 'far') if score else (
                 'extra' if thing.category in true else 'false')
         rows.append({
-            'k': drawn.index(i) if i in drawn else -1, 'name': thing.category,
+            'k': drawn.index(i) if i in drawn else -1, 'name': thing.category, 'id': thing.id,
             'score': thing.score, 'at': [100 * x for x in thing.translation],
             'size': [100 * x for x in thing.size], 'verdict': verdict,
             'error_mm': 1000 * score.centre_m if score else None,
@@ -46,6 +46,21 @@ def missed_rows(scene: ReportScene, palette: Palette) -> list[dict[str, Any]]:
              'size': [100 * x for x in truth[s.truth].size],
              'colour': pictures.hex_colour(palette[s.category])}
             for s in scene.scores or () if s.estimate is None]
+
+
+def event_rows(scene: ReportScene, palette: Palette) -> list[dict[str, Any]] | None:
+    """Return one row per event before a frame set, None where nobody says."""
+    if scene.events is None:
+        return None
+    rows = []
+    for event in scene.events:
+        now, before = event.get('translation'), event.get('before')
+        gap = None if now is None or before is None else np.subtract(now, before)
+        rows.append({
+            'what': event['event'], 'name': event['category'], 'id': event['id'],
+            'moved_cm': None if gap is None else 100 * float(np.linalg.norm(gap)),
+            'colour': pictures.hex_colour(palette[event['category']])})
+    return rows
 
 
 def rejected_rows(scene: ReportScene, palette: Palette) -> list[dict[str, Any]]:

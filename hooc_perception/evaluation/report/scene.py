@@ -28,7 +28,6 @@ SAME_M = 1e-4
 # What the results say of each object beside its pose.
 EVIDENCE = ('visible_ratio', 'residual_m', 'energy_delta', 'n_views')
 
-
 # Stands for the category of things that have none; no category can have this name, see `fields`.
 UNKNOWN = '(unknown)'
 
@@ -49,6 +48,8 @@ class ReportScene:
     :ivar class_names: names of the class ids 1..N, needed with probabilities.
     :ivar pool: every candidate that was considered.
     :ivar converged: False where a deadline ended the search.
+    :ivar stamp_ns: of the frame set, None where the results do not say.
+    :ivar events: what happened before it, dicts as in `objects/events`; None where nobody says.
     """
 
     name: str
@@ -64,6 +65,8 @@ class ReportScene:
     class_names: tuple[str, ...] = ()
     pool: tuple[PosedObject, ...] = ()
     converged: bool = True
+    stamp_ns: int | None = None
+    events: tuple[Mapping[str, Any], ...] | None = None
 
     @property
     def known(self) -> list[PosedObject]:
@@ -147,7 +150,8 @@ def report_scene(entry: Mapping[str, Any], views: Iterable[DepthView | Rectified
         tuple({k: o.get(k) for k in EVIDENCE} for o in entry['objects']),
         entry.get('energy'), entry.get('seconds'), entry.get('stage_seconds') or {},
         probabilities, names, () if pool is None else tuple(candidate_objects(pool, names)),
-        bool(entry.get('converged', True)))
+        bool(entry.get('converged', True)), entry.get('stamp_ns'),
+        None if entry.get('events') is None else tuple(entry['events']))
 
 
 def box_model() -> GenericModel:

@@ -23,7 +23,7 @@ const views = [];
 
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0));
 const shorts = text => new Uint16Array(bytes(text).buffer);
-const pretty = name => name.replace(/_/g, ' ');
+const label = o => o.name.replace(/_/g, ' ') + (o.id === null ? '' : ` ${o.id}`);
 
 // ---- what scenes share
 
@@ -53,7 +53,15 @@ const posed = (object, at) => {
   return object;
 };
 
-// ---- one scene
+const clear = group => {
+  group.children.forEach(part => {
+    part.material.dispose();
+    if (part.userData.own) part.geometry.dispose();
+  });
+  group.clear();
+};
+
+// ---- one scene, or the frame sets of a sequence
 
 class Space {
   constructor(box) {
@@ -66,8 +74,11 @@ class Space {
     this.scene = new THREE.Scene();
     this.parts = {models: new THREE.Group(), truth: new THREE.Group(), table: new THREE.Group(),
       cameras: new THREE.Group()};
-    this.scene.add(...Object.values(this.parts));
-    this.build();
+    this.cloud = new THREE.Group();
+    this.boxes = new THREE.Group();
+    this.scene.add(...Object.values(this.parts), this.cloud, this.boxes);
+    this.addTable();
+    this.build(Number(box.dataset.step || 0));
     this.light();
     this.steer();
     this.toggles = [...box.querySelectorAll('input')];
@@ -77,15 +88,25 @@ class Space {
     this.reset();
   }
 
-  build() {
-    const {objects, truth, cameras} = this.data;
-    this.objects = objects.map((o, k) => ({...o, k, middle: o.at.slice(9),
+  // What a frame set shows takes the place of what was shown.
+  build(index) {
+    this.step = this.data.steps[index];
+    const {models, truth, cameras} = this.parts;
+    [models, truth, cameras, this.cloud, this.boxes].forEach(clear);
+    this.objects = this.step.objects.map((o, k) => ({...o, k, middle: o.at.slice(9),
       solid: this.addModel(o), box: this.addBox(o)}));
-    truth.forEach(o => this.parts.truth.add(posed(new THREE.Mesh(
+    this.step.truth.forEach(o => truth.add(posed(new THREE.Mesh(
       shape(o.mesh).solid, this.glass(0xffffff, 0.45)), o.at)));
     this.addPoints();
-    this.addTable();
-    cameras.forEach((camera, k) => this.addCamera(camera, k));
+    this.step.cameras.forEach((camera, k) => this.addCamera(camera, k));
+  }
+
+  // Show the frame set of a number from 0 on; an object with an id stays picked.
+  show(index) {
+    const id = this.picked === null ? null : this.objects[this.picked].id;
+    this.build(index);
+    const k = id === null ? -1 : this.objects.findIndex(o => o.id === id);
+    this.pick(k < 0 ? null : k);
   }
 
   // Transparent things do not hide what is in them.
@@ -107,12 +128,12 @@ class Space {
   addBox(o) {
     const made = posed(lines(shape(o.mesh).box, PICKED), o.at);
     made.visible = false;
-    this.scene.add(made);
+    this.boxes.add(made);
     return made;
   }
 
   addPoints() {
-    const {groups, low, span, p, rgb} = this.data.cloud, colours = bytes(rgb);
+    const {groups, low, span, p, rgb} = this.step.cloud, colours = bytes(rgb);
     const places = Float32Array.from(shorts(p), (x, i) => low[i % 3] + span[i % 3] * x / 65535);
     let first = 0;
     this.points = groups.map(({camera, kind, n}) => {
@@ -122,7 +143,8 @@ class Space {
         colours.slice(...part), 3, true));
       const made = new THREE.Points(geometry, new THREE.PointsMaterial({vertexColors: true,
         size: this.distance() * (kind === 'unexplained' ? 0.009 : 0.006)}));
-      this.scene.add(made);
+      made.userData.own = true;
+      this.cloud.add(made);
       return {camera, kind, made};
     });
   }
@@ -141,7 +163,9 @@ class Space {
     for (let i = 1; i < 5; i++) ends.push(p[0], p[i], p[i], p[i % 4 + 1]);
     const geometry = new THREE.BufferGeometry().setAttribute(
       'position', new THREE.BufferAttribute(new Float32Array(ends.flat()), 3));
-    this.parts.cameras.add(lines(geometry, CAMERAS[k % CAMERAS.length]));
+    const made = lines(geometry, CAMERAS[k % CAMERAS.length]);
+    made.userData.own = true;
+    this.parts.cameras.add(made);
   }
 
   light() {
@@ -212,9 +236,9 @@ class Space {
     const on = this.choose(), context = this.canvas.getContext('2d');
     renderer.render(this.scene, this.camera);
     context.drawImage(renderer.domElement, 0, 0);
-    if (on.names) this.objects.forEach(o => this.write(context, scale, o.middle, pretty(o.name),
+    if (on.names) this.objects.forEach(o => this.write(context, scale, o.middle, label(o),
       o.k === this.picked ? '#ffffff' : `rgb(${o.colour})`));
-    if (on.cameras) this.data.cameras.forEach((c, k) => this.write(context, scale, c.frustum[0],
+    if (on.cameras) this.step.cameras.forEach((c, k) => this.write(context, scale, c.frustum[0],
       c.name, `#${CAMERAS[k % CAMERAS.length].toString(16)}`));
   }
 
@@ -242,7 +266,7 @@ class Space {
     this.panel.hidden = k === null;
     if (k !== null) {
       const o = this.objects[k], title = document.createElement('b');
-      title.textContent = pretty(o.name);
+      title.textContent = label(o);
       const list = document.createElement('dl');
       for (const [label, text] of o.facts) {
         list.append(Object.assign(document.createElement('dt'), {textContent: label}),
@@ -275,6 +299,8 @@ class Space {
       ArrowRight: () => controls.rotateLeft(-0.1), ArrowUp: () => controls.rotateUp(0.1),
       ArrowDown: () => controls.rotateUp(-0.1), '+': () => controls.dollyIn(0.9),
       '-': () => controls.dollyOut(0.9), Escape: () => this.pick(null)};
+    // In a sequence, these go to the next frame set.
+    if (this.data.steps.length > 1) ['ArrowLeft', 'ArrowRight'].forEach(key => delete keys[key]);
     canvas.addEventListener('keydown', e => {
       if (keys[e.key]) { e.preventDefault(); keys[e.key](); }
     });

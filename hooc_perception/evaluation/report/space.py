@@ -15,7 +15,13 @@ from hooc_perception.core.types import Camera, GenericModel
 from hooc_perception.evaluation.errors import affine
 from hooc_perception.evaluation.matching import member_of, PosedObject, shape_of
 from hooc_perception.evaluation.report import pictures
-from hooc_perception.evaluation.report.cloud import extent_of, PointGroup, seen_points, thinned
+from hooc_perception.evaluation.report.cloud import (
+    extent_of,
+    inside,
+    PointGroup,
+    seen_points,
+    thinned,
+)
 from hooc_perception.evaluation.report.pictures import Palette, RGB
 from hooc_perception.evaluation.report.scene import ShownScene, UNKNOWN
 from hooc_perception.evaluation.report.viewpoint import azimuth_beside, Viewpoint, viewpoint
@@ -64,83 +70,105 @@ def script_json(content: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Space:
+class Step:
     """
-    What the 3D view of one scene shows.
+    What the 3D view shows of one frame set.
 
     :ivar colours: (r, g, b) of every drawn object.
-    :ivar groups: the points in the box (`low`, `high`), thinned.
-    :ivar view: where the viewer stands at first.
+    :ivar groups: the points in the box of the view, thinned.
     """
 
     shown: ShownScene
     colours: list[RGB]
     groups: list[PointGroup]
+
+
+@dataclass(frozen=True)
+class Space:
+    """
+    The 3D view of a scene, or of the frame sets of a sequence.
+
+    :ivar low, high: (3,) the box that the points of all frame sets are in, metres.
+    :ivar voxel_m: size of the cubes with one point each.
+    :ivar view: where the viewer stands at first.
+    """
+
+    steps: list[Step]
     low: Float64Array
     high: Float64Array
+    voxel_m: float
     view: Viewpoint
 
     @staticmethod
-    def of(shown: ShownScene, palette: Palette) -> 'Space':
-        """Return the 3D view of a scene."""
-        observation = shown.scene.observation
-        colours = pictures.instance_colours(shown.drawn, palette)
-        groups = seen_points(observation, shown.meshes, colours)
-        low, high = extent_of(groups, shown.meshes)
-        groups = thinned(groups, low, high)
-        cameras = [view.camera for view in observation.views]
+    def of(scenes: Sequence[ShownScene], palette: Palette) -> 'Space':
+        """Return the 3D view of one or several frame sets."""
+        colours = [pictures.instance_colours(s.drawn, palette) for s in scenes]
+        groups = [seen_points(s.scene.observation, s.meshes, rgb)
+                  for s, rgb in zip(scenes, colours)]
+        meshes = [mesh for s in scenes for mesh in s.meshes]
+        low, high = extent_of([g for step in groups for g in step], meshes)
+        thin, voxel_m = thinned([inside(step, low, high) for step in groups])
+        cameras = [view.camera for s in scenes for view in s.scene.observation.views]
         middle = (low + high) / 2
         table = [(x, y, 0.0) for x in (low[0], high[0]) for y in (low[1], high[1])]
         view = viewpoint(
-            np.concatenate([table, *(g.points for g in groups), *(v for v, _ in shown.meshes)]),
+            np.concatenate([table, *(g.points for step in thin for g in step),
+                            *(v for v, _ in meshes)]),
             azimuth_beside(cameras[0], middle),
             np.concatenate([*(frustum(c, middle) for c in cameras),
-                            *(v for v, _ in shown.true_meshes)]))
-        return Space(shown, colours, groups, low, high, view)
+                            *(v for s in scenes for v, _ in s.true_meshes)]))
+        return Space([Step(*step) for step in zip(scenes, colours, thin)], low, high, voxel_m,
+                     view)
 
-    def json(self, rows: Sequence[Mapping[str, Any]], store: Meshes) -> str:
+    def json(self, rows: Sequence[Sequence[Mapping[str, Any]]], store: Meshes) -> str:
         """
         Return the view as JSON for a script element.
 
-        :param rows: rows of the objects' table, for the details of an object that is clicked.
+        :param rows: of each step, rows of the objects' table, for the details of an object that
+            is clicked.
         :param store: the meshes of the page.
         """
-        models, facts = self.shown.scene.models, {row['k']: facts_of(row) for row in rows}
-        objects = [{'name': o.category, 'colour': [int(c) for c in self.colours[k]],
-                    'unknown': o.category == UNKNOWN,
-                    'facts': facts.get(k, [])} | placed(o, models, store)
-                   for k, o in enumerate(self.shown.drawn)]
-        middle = (self.low + self.high) / 2
         return script_json({
-            'objects': objects, 'cloud': self._cloud(),
-            'truth': [{'name': o.category} | placed(o, models, store) for o in self.shown.true],
-            'cameras': [{'name': v.camera.name, 'frustum': frustum(v.camera, middle).tolist()}
-                        for v in self.shown.scene.observation.views],
+            'steps': [self._step(*step, store) for step in zip(self.steps, rows)],
             # Results are in a frame whose z = 0 is the table top.
             'table': {'low': self.low[:2].tolist(), 'high': self.high[:2].tolist(), 'z': 0.0},
             'view': {'eye': self.view.eye.tolist(), 'target': self.view.target.tolist(),
                      'field': self.view.field_deg, 'near': self.view.near, 'far': self.view.far,
                      'nearest': self.view.nearest, 'farthest': self.view.farthest}})
 
-    def _cloud(self) -> dict[str, Any]:
-        """Return the points, packed, in the order of the groups."""
-        points = np.concatenate([g.points for g in self.groups])
-        rgb = np.concatenate([g.rgb for g in self.groups])
+    def _step(self, step: Step, rows: Sequence[Mapping[str, Any]],
+              store: Meshes) -> dict[str, Any]:
+        """Return what changes from one frame set to the next."""
+        shown, middle = step.shown, (self.low + self.high) / 2
+        models, facts = shown.scene.models, {row['k']: facts_of(row) for row in rows}
+        objects = [{'name': o.category, 'id': o.id, 'colour': [int(c) for c in step.colours[k]],
+                    'unknown': o.category == UNKNOWN,
+                    'facts': facts.get(k, [])} | placed(o, models, store)
+                   for k, o in enumerate(shown.drawn)]
+        return {'objects': objects, 'cloud': self._cloud(step.groups),
+                'truth': [{'name': o.category} | placed(o, models, store) for o in shown.true],
+                'cameras': [{'name': v.camera.name, 'frustum': frustum(v.camera, middle).tolist()}
+                            for v in shown.scene.observation.views]}
+
+    def _cloud(self, groups: Sequence[PointGroup]) -> dict[str, Any]:
+        """Return points, packed, in the order of the groups."""
+        points = np.concatenate([g.points for g in groups])
+        rgb = np.concatenate([g.rgb for g in groups])
         span = self.high - self.low
         return {'groups': [{'camera': g.camera, 'kind': g.kind, 'n': len(g.points)}
-                           for g in self.groups],
+                           for g in groups],
                 'low': self.low.tolist(), 'span': span.tolist(),
                 'p': packed(np.round(65535 * (points - self.low) / span), np.uint16),
                 'rgb': packed(rgb.clip(0, 255), np.uint8)}
 
     def still(self) -> UInt8Array:
-        """Return (h, w, 3) uint8: the first view, for browsers and prints without 3D."""
-        camera = self.view.camera(STILL_SIZE)
-        rgb = render_shaded(self.shown.meshes, camera, colours=self.colours,
+        """Return (h, w, 3) uint8: the first frame set, for browsers and prints without 3D."""
+        camera, step = self.view.camera(STILL_SIZE), self.steps[0]
+        rgb = render_shaded(step.shown.meshes, camera, colours=step.colours,
                             background=pictures.NOTHING).copy()
-        surface = render_depth(self.shown.meshes, camera)[0]
-        points = np.concatenate([g.points for g in self.groups])
-        colours = np.concatenate([g.rgb for g in self.groups]).clip(0, 255)
+        surface = render_depth(step.shown.meshes, camera)[0]
+        points = np.concatenate([g.points for g in step.groups])
+        colours = np.concatenate([g.rgb for g in step.groups]).clip(0, 255)
         local = transform(inverse(camera.T_world_camera), points)
         u, v = (np.round(x).astype(int) for x in project(camera.K, local))
         # Two by two pixels each.

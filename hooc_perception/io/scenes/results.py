@@ -16,6 +16,7 @@ import numpy as np
 FORMAT = 'hooc-results/1'
 # Ids are unsigned 32-bit numbers in the nodes.
 LAST_ID = 2 ** 32 - 1
+LAST_STAMP_NS = 2 ** 63 - 1
 _TERMS = ('total', 'depth', 'probability', 'overlap')
 
 
@@ -165,6 +166,31 @@ def _check_scene(scene: dict[str, Any], where: str) -> None:
         _check_box(item, f'{where} objects[{i}]')
     for i, item in enumerate(fields.sequence(scene.get('unknown') or [], f'{where} unknown')):
         _check_box(fields.mapping(item, f'{where} unknown[{i}]'), f'{where} unknown[{i}]')
+    if scene.get('stamp_ns') is not None:
+        fields.integer(scene['stamp_ns'], 0, LAST_STAMP_NS, f'{where} stamp_ns')
+    if scene.get('events') is not None:
+        checked_events(scene['events'], where)
+
+
+def checked_events(value: object, where: str) -> list[dict[str, Any]]:
+    """
+    Return the events of one result: dicts as in `objects/events`.
+
+    :param where: names the source in the error.
+    :raises HoocError: one sentence that names the field.
+    """
+    events = [fields.mapping(item, f'{where} events[{i}]')
+              for i, item in enumerate(fields.sequence(value, f'{where} events'))]
+    for i, item in enumerate(events):
+        for key in ('event', 'category'):
+            fields.text(fields.required(item, key, f'{where} events[{i}]'),
+                        f'{where} events[{i}] {key}')
+        fields.integer(fields.required(item, 'id', f'{where} events[{i}]'), 0, LAST_ID,
+                       f'{where} events[{i}] id')
+        for key in ('translation', 'before'):
+            if item.get(key) is not None:
+                fields.numbers(item[key], 3, f'{where} events[{i}] {key}')
+    return events
 
 
 def _check_box(item: dict[str, Any], where: str) -> None:

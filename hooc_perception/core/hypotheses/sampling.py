@@ -126,13 +126,13 @@ def sample(cloud: Cloud, field: Field, shapes: Shapes, config: ProposeConfig,
 
     first = int(FIRST_STEPS * counts.refine_steps)
     refine(first)
-    rows = _best_half(H[:, SCORE], shape)
+    rows = best_half(H[:, SCORE], shape)
     H, shape = np.ascontiguousarray(H[rows]), shape[rows]
     refine(counts.refine_steps - first)
     return H, shape
 
 
-def _best_half(score: Float64Array, shape: Int64Array) -> Int64Array:
+def best_half(score: Float64Array, shape: Int64Array) -> Int64Array:
     """Return the rows of the better half of the hypotheses of each mesh, in their order."""
     order = np.lexsort((-score, shape))
     first = np.searchsorted(shape[order], shape[order])

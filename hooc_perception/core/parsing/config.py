@@ -57,7 +57,7 @@ class ParseConfig(Config):
                       'next round.', low=1)
     finalists: int = param(8, 'Candidates per category, beside the chosen ones, that are compared '
                            'in full resolution.', low=1)
-    polish_steps: int = param(20, 'Refinement steps of a chosen object.', low=0)
+    polish_steps: int = param(60, 'Refinement steps of a chosen object.', low=0)
     turn_steps: int = param(10, 'Refinement steps of a chosen object after half a turn about each '
                             'of its axes; 0 = no such turns.', low=0)
     member_steps: int = param(6, 'Refinement steps of a chosen object after its mesh was '

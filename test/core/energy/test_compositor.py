@@ -66,6 +66,29 @@ def test_reset_equals_the_flips_that_lead_there():
     assert np.array_equal(a.deltas(), b.deltas())
 
 
+def test_new_prices_equal_a_new_energy_with_them():
+    rng = np.random.default_rng(4)
+    *lists, unary = random_lists(rng)
+    energy, mask = Compositor(*lists, np.zeros(len(unary))), rng.random(len(unary)) < .4
+    energy.reset(mask)
+    energy.reprice(unary)
+    other = Compositor(*lists, unary)
+    other.reset(mask)
+    assert energy.value == other.value == other.evaluate(mask)
+    assert np.array_equal(energy.deltas(), other.deltas())
+
+
+def test_the_number_of_threads_changes_nothing(monkeypatch):
+    lists = random_lists(np.random.default_rng(5), ties=True)
+    shown = []
+    for threads in (1, 2, 7):
+        monkeypatch.setattr(compositor.nb, 'get_num_threads', lambda threads=threads: threads)
+        energy = Compositor(*lists)
+        energy.reset(np.ones(energy.n, bool))
+        shown.append((energy.value, *energy.shown(), *energy.deltas()))
+    assert shown[0] == shown[1] == shown[2]
+
+
 def test_a_million_flips_do_not_drift():
     rng = np.random.default_rng(3)
     energy = Compositor(*random_lists(rng, n=4, n_pixels=40))

@@ -2,6 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """Greedy and iterated local search against brute force on composited energies."""
 
+import sys
+
+from hooc_perception.core.energy import local_search as module
 from hooc_perception.core.energy.compositor import Compositor
 from hooc_perception.core.energy.local_search import (
     best_swap,
@@ -65,6 +68,30 @@ def test_greedy_ends_where_no_flip_helps_and_descend_where_no_swap_does():
             other = here.copy()
             other[[a, b]] = False, True
             assert energy.evaluate(other) >= energy.value - 1e-9
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_known_optima_save_flips_and_change_nothing(seed, monkeypatch):
+    class Counting(Compositor):
+        flips = 0
+
+        def flip(self, k):
+            Counting.flips += 1
+            super().flip(k)
+
+    monkeypatch.setattr(sys.modules[__name__], 'Compositor', Counting)
+    found, flips = [], []
+    for forget in (False, True):
+        if forget:
+            def forgetting(energy, config, stop, optima):
+                descend(energy, config, stop)
+            monkeypatch.setattr(module, 'descend', forgetting)
+        Counting.flips = 0
+        found.append(local_search(instance(seed, n=40), np.random.default_rng(1)))
+        flips.append(Counting.flips)
+    assert np.array_equal(found[0].mask, found[1].mask)
+    assert found[0].energy == found[1].energy
+    assert flips[0] < flips[1]
 
 
 def test_a_swap_that_does_not_help_leaves_everything_alone():

@@ -117,6 +117,23 @@ def test_every_flip_of_a_walk_agrees_with_the_whole():
     assert np.array_equal(term.mask, mask)
 
 
+def test_what_was_compared_before_does_not_matter():
+    rng = np.random.default_rng(7)
+    n = 90
+    objects = placed(*[(c, rng.uniform(-.1, .1, 3), rng.normal(size=3), MODELS[c - 1].extents)
+                       for c in (1, 2, 3) * (n // 3)])
+    walked = OverlapTerm(objects, MODELS)
+    for k in rng.permutation(n)[:60]:
+        walked.flip(k)
+    for k in np.flatnonzero(walked.mask)[5:]:
+        walked.flip(k)
+    fresh = OverlapTerm(objects, MODELS)
+    fresh.reset(walked.mask)
+    assert walked.value == fresh.value > 0
+    assert np.array_equal(walked.deltas(), fresh.deltas())
+    assert np.array_equal(walked.pairwise(), pairwise(objects, MODELS))
+
+
 @pytest.mark.parametrize('spoil', ['none', 'inside out', 'lid off', 'parts overlap'])
 def test_occupancy_has_the_volume_of_the_solid(spoil):
     mesh = solid = trimesh.creation.cylinder(.04, .1, sections=24)

@@ -140,6 +140,26 @@ def test_the_true_pose_scores_above_what_is_clearly_wrong(ground):
             assert value(ground, wrong, c, 512) < best
 
 
+def test_only_draws_without_hope_are_given_up(ground):
+    n, given_up = POINTS, 0
+    for h, c in zip(ground.H, ground.model_of):
+        whole = value(ground, h, c)
+
+        def tried(least, h=h, c=c):
+            return drawing.score_if_hopeful(h, surface_of(ground, c), n, ground.field, WEIGHTS,
+                                            np.empty((3, 3)), NO_EQUATIONS, least)
+
+        assert tried(-np.inf) == pytest.approx(whole, abs=1e-9)
+        first = value(ground, h, c, int(drawing.FIRST_SHARE * n))
+        for least in (0.2, 0.6):
+            if first < drawing.HOPEFUL * least:
+                assert tried(least) == -np.inf
+                given_up += 1
+            else:
+                assert tried(least) == pytest.approx(whole, abs=1e-9)
+    assert 0 < given_up < 2 * len(ground.H)
+
+
 def test_quick_field_and_its_sum(ground):
     data = ground.field.data
     coarse = scoring.quick_field(data)

@@ -113,6 +113,16 @@ def test_without_objects_all_is_left(desk, cheap):
     assert all(off(more, desk, c)[0].min() < 0.015 for c in (1, 2, 3))
 
 
+def test_few_candidates_are_drawn_for_a_little_that_is_left(desk, cheap):
+    config = replace(cheap, round_per_category=10, round_pool=40)
+    little = more_for(desk, desk.truth.take(desk.truth.category != 1), config)
+    everything = more_for(desk, Candidates.empty(), config)
+    whole = more_for(desk, desk.truth.take(desk.truth.category != 1),
+                     replace(config, least_effort=1.0))
+    assert len(little) < len(whole)
+    assert np.bincount(everything.category).max() > 0.3 * 10
+
+
 def test_rounds_draw_numbers_of_their_own(desk, cheap):
     two = desk.truth.take([0, 2])
     first, again, second = (more_for(desk, two, cheap, turn) for turn in (1, 1, 2))

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from hooc_perception.core.frame.kernels import compare as stat
 from hooc_perception.core.hypotheses.sampling import (
     benefit,
+    best_half,
     non_maximum_suppression,
     sample,
     SampleCounts,
@@ -119,6 +120,13 @@ def row(**named):
     for name, value in named.items():
         out[getattr(stat, name)] = value
     return out
+
+
+def test_the_better_half_of_each_mesh_goes_on():
+    score = np.array([3., 1, 2, 5, 4, 9, 7, 7])
+    shape = np.array([0, 0, 0, 1, 1, 2, 3, 3])
+    assert best_half(score, shape).tolist() == [0, 2, 3, 5, 6]
+    assert len(best_half(score[:0], shape[:0])) == 0
 
 
 def test_benefit_ranks_by_what_is_explained():

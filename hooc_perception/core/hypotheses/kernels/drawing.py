@@ -185,9 +185,9 @@ def _worst_of(cell: Float64Array) -> int:
 
 
 @nb.njit(cache=True)
-def _score_if_hopeful(h: Float64Array, surface: Surface, n: int, field: Field,
-                      weights: ScoreWeights, R: Float64Array, equations: Float64Array,
-                      least: float) -> float:
+def score_if_hopeful(h: Float64Array, surface: Surface, n: int, field: Field,
+                     weights: ScoreWeights, R: Float64Array, equations: Float64Array,
+                     least: float) -> float:
     """Return the score of `h` from n points, or -inf if the first of them have little hope."""
     first = int(FIRST_SHARE * n)
     a = field_evidence(h, surface, 0, first, field, R, equations)
@@ -228,8 +228,8 @@ def sample(seed: int, model: Model, scene: Surface, scene_cdf: Float64Array, fie
         y = min(np_y - 1, max(0, int((h[TY] - origin[1]) / CELL_M)))
         cell = cells[x * np_y + y]
         worst = _worst_of(cell)
-        reached = _score_if_hopeful(h, surface, settings.points, field, weights, R, no_equations,
-                                    cell[worst, SCORE])
+        reached = score_if_hopeful(h, surface, settings.points, field, weights, R, no_equations,
+                                   cell[worst, SCORE])
         if reached > cell[worst, SCORE]:
             cell[worst, :WIDTH] = h
             cell[worst, SCORE] = reached

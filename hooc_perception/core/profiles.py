@@ -73,7 +73,7 @@ def profile(name: str) -> Profile:
                        propose=FragmentConfig(), parse=PaperParseConfig())
     if name == 'fast':
         return Profile('fast', classify=ClassifyConfig(stride=3),
-                       propose=ProposeConfig(samples=2500, pool=30, refine_steps=12, polish=6,
+                       propose=ProposeConfig(samples=5000, pool=30, refine_steps=12, polish=6,
                                              polish_steps=6, per_category=8, round_samples=1000,
                                              round_pool=10, round_per_category=3),
                        parse=_fast_parse())

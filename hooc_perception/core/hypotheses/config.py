@@ -11,8 +11,9 @@ from hooc_perception.core.config import Config, param
 class ProposeConfig(Config):
     """Parameters of stage 3 of the joint method."""
 
-    samples: int = param(5000, 'Poses drawn per category.', low=100)
-    pool: int = param(80, 'Hypotheses per category that are refined in the voxel field.', low=5)
+    samples: int = param(10000, 'Poses drawn per category where much stands on the table (twenty '
+                         'objects); where there is less foreground fewer, down to half.', low=100)
+    pool: int = param(120, 'Hypotheses per category that are refined in the voxel field.', low=5)
     refine_steps: int = param(20, 'Refinement steps in the voxel field.', low=0)
     polish: int = param(15, 'Hypotheses per category that are refined in the images.', low=1)
     polish_steps: int = param(10, 'Refinement steps in the images.', low=0)

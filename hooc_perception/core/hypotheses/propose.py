@@ -34,6 +34,8 @@ from scipy.spatial.transform import Rotation
 MANY = 120
 # Weight of points that are explained, where the unexplained ones are drawn with 1.
 ELSEWHERE = 0.02
+# Points of the cloud of a full table, where all poses are drawn; at least this share of them is.
+FULL_TABLE, LEAST_FILLED = 40_000, 0.5
 # Where a third of the foreground is asked for, all candidates of a round are drawn.
 FULL_EFFORT = 3.0
 # Refinement in the images: cost of the squared log scale per covered pixel, and initial random
@@ -61,8 +63,10 @@ def propose(frame: Frame, config: ProposeConfig, costs: PixelCosts,
     """
     if frame.field is None:
         return Candidates.empty()
-    H, shape = sample(frame.cloud, frame.field, frame.shapes, config, rng,
-                      SampleCounts(config.samples, config.pool, config.refine_steps))
+    filled = min(max(len(frame.cloud.points) / FULL_TABLE, LEAST_FILLED), 1.0)
+    H, shape = sample(
+        frame.cloud, frame.field, frame.shapes, config, rng,
+        SampleCounts(share_of(config.samples, filled), config.pool, config.refine_steps))
     return _ranked(frame, _Ranking(config, costs, config.polish, config.per_category), rng, H,
                    shape, lambda evidence: evidence.nothing)
 

@@ -166,9 +166,10 @@ class OverlapTerm:
         first, last = self._compared, self._compared + len(new)
         if last > len(self._meets):
             more = max(last, 2 * len(self._meets), LEAST_ROWS) - len(self._meets)
-            self._meets, self._inside, self._around = (
-                np.concatenate([rows, np.zeros((more, *rows.shape[1:]), rows.dtype)])
-                for rows in (self._meets, self._inside, self._around))
+            self._meets = np.concatenate([self._meets, np.zeros((more, self.n), bool)])
+            room = np.zeros((more, *self._inside.shape[1:]), np.uint64)
+            self._inside = np.concatenate([self._inside, room])
+            self._around = np.concatenate([self._around, room])
         self._row[new], self._compared = np.arange(first, last), last
         kernels.compare(new, self._poses, self._solids, self._meets[first:last],
                         self._inside[first:last], self._around[first:last])

@@ -102,7 +102,6 @@ def build_field(observation: Observation, cloud: Cloud, voxel_m: float = 0.005,
     hi = cloud.points.max(0) + border_m
     shape = np.ceil((hi - lo) / voxel_m).astype(int)
     data = np.zeros((*shape, kernel.CHANNELS), np.uint8)
-    data[..., kernel.DISTANCE] = 255
     field = Field(data, lo, voxel_m, truncation_m)
     kernel.fill_distance(field, cloud.points, cloud.normals, nb.get_num_threads())
     for view in observation.views:

@@ -94,8 +94,8 @@ def fill_distance(field: Field, points: Float64Array, normals: Float64Array,
     """
     Write what is known of the surface point nearest to each voxel's centre into the field.
 
-    Distance: 255 = `truncation`. Normal: 128 + 127 times each component. Height of the centre
-    over the tangent plane of that point: 128 + 127 = `truncation`.
+    Distance: 255 = `truncation` or more. Normal: 128 + 127 times each component. Height of the
+    centre over the tangent plane of that point: 128 + 127 = `truncation`.
 
     :param points: (n, 3) float64 surface points; `normals` (n, 3) float64 unit.
     :param blocks: number of threads; it does not change the result.
@@ -107,6 +107,7 @@ def fill_distance(field: Field, points: Float64Array, normals: Float64Array,
     # Each slab of voxels is filled by one thread, which looks at all points in their order.
     for block in nb.prange(blocks):
         low, high = block * nx // blocks, (block + 1) * nx // blocks
+        data[low:high, :, :, DISTANCE] = 255
         for i in range(points.shape[0]):
             gx = (points[i, 0] - origin[0]) / voxel
             gy = (points[i, 1] - origin[1]) / voxel

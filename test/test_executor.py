@@ -38,7 +38,7 @@ TINY = {
              VerifierConfig(verifier_scenes=4, forest=FitConfig(trees=3, min_leaf=5))),
 }
 
-CHEAP = [word for text in ('propose.samples=3000', 'propose.pool=30', 'propose.polish=6',
+CHEAP = [word for text in ('propose.samples=6000', 'propose.pool=30', 'propose.polish=6',
                            'propose.per_category=4', 'parse.rounds=0')
          for word in ('--set-parameter', text)]
 

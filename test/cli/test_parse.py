@@ -26,7 +26,7 @@ import trimesh
 MESHES = {'ball': trimesh.creation.icosphere(3, 0.04),
           'box': trimesh.creation.box((0.14, 0.10, 0.06))}
 PLACES = {'ball': np.array([0.09, 0.0, 0.04]), 'box': np.array([-0.06, 0.03, 0.03])}
-CHEAP = [word for text in ('propose.samples=3000', 'propose.pool=30', 'propose.polish=6',
+CHEAP = [word for text in ('propose.samples=6000', 'propose.pool=30', 'propose.polish=6',
                            'propose.per_category=4', 'parse.rounds=0')
          for word in ('--set-parameter', text)]
 

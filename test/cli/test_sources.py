@@ -2,10 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """`hooc parse` reads the bundled bag as it reads a scene set."""
 
-from argparse import Namespace
 from dataclasses import replace
 
-from hooc_perception.cli import report
+from hooc_perception.cli.report_source import source_of
 from hooc_perception.cli.sources import load_source, provenance
 from hooc_perception.errors import HoocError
 from hooc_perception.io.bags.folder import is_bag
@@ -67,8 +66,7 @@ def test_a_bag_of_a_sequence_is_a_set_of_its_frame_sets(repository, model, tmp_p
         source.selected(['c'])
     # `hooc report` finds the frame set of each entry, and that of `hooc run` under the bag's name.
     results = {'dataset': 'still', 'scenes': [{'scene': n, 'bag': 's'} for n in ('a', 's')]}
-    shown = report._source(Namespace(results=tmp_path / 'r.json', set=None, scene=[]), results,
-                           model)
+    shown = source_of(str(tmp_path / 'r.json'), None, [], results, model)
     assert [type(scene) for scene in shown.scenes] == [BagScene, BagFrameSet]
     assert [scene.name for scene in shown.scenes] == ['s', 'a']
 

@@ -80,9 +80,10 @@ def _is_other(before: Observation, now: Observation, config: ObserveConfig) -> b
 
 
 def _continues(before: Watched, views: Sequence[RectifiedView]) -> bool:
-    """Return whether a frame set is of the same cameras in the same places."""
+    """Return whether a frame set is of the same cameras in the same places, in the same sizes."""
     return len(before.accumulated) == len(views) and all(
-        a is None or a.continues(view) for a, view in zip(before.accumulated, views))
+        seen.depth.shape == view.depth.shape and (a is None or a.continues(view))
+        for seen, a, view in zip(before.observation.views, before.accumulated, views))
 
 
 def _next(views: Sequence[RectifiedView], before: Watched, config: ObserveConfig,

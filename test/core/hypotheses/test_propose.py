@@ -114,7 +114,7 @@ def test_without_objects_all_is_left(desk, cheap):
 
 
 def test_few_candidates_are_drawn_for_a_little_that_is_left(desk, cheap):
-    config = replace(cheap, round_per_category=10, round_pool=40)
+    config = replace(cheap, round_per_category=10, round_pool=40, least_effort=0.3)
     little = more_for(desk, desk.truth.take(desk.truth.category != 1), config)
     everything = more_for(desk, Candidates.empty(), config)
     whole = more_for(desk, desk.truth.take(desk.truth.category != 1),

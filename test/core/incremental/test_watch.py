@@ -164,6 +164,18 @@ def test_a_camera_that_comes_later(seen, cube, board):
     assert not after.fresh and np.median(after.accumulated[1].count) == 3
 
 
+def test_a_camera_that_comes_later_in_another_size_than_was_expected(seen, cube, board):
+    views = seen(cube, board)
+    camera = views[0].camera
+    nominal = replace(camera, width=2 * camera.width, height=2 * camera.height)
+    nothing = np.full((nominal.height, nominal.width), np.nan, np.float32)
+    first = watch([replace(views[0], camera=nominal, depth=nothing), *views[1:]], None)
+    now = seen(cube, board, seed=1)
+    after = watch(now, first)
+    assert after.fresh
+    assert_same(after.observation, observe(now))
+
+
 def test_a_frame_set_without_any_reading_is_refused(seen, cube, board, start):
     with pytest.raises(HoocError, match='holds no reading'):
         watch([blind(view) for view in seen(cube, board)], start)

@@ -224,6 +224,34 @@ def make_chain(bench, folder, monkeypatch):
 
 
 @pytest.fixture
+def live(bench, make_chain):
+    """
+    Return a function that brings up the four nodes so that their answers follow the frame sets.
+
+    It takes parameters of the parsing node and returns (stages, function that sends images and
+    returns the next answer).
+    """
+    from geometry_msgs.msg import PoseArray
+    from hooc_perception.ros.qos import qos
+
+    def make(**parsing):
+        parameters = {i: {'incremental': True} for i in range(4)}
+        parameters[0]['max_frame_age_s'] = 0.0
+        parameters[3].update(parsing)
+        stages, send = make_chain(parameters=parameters)
+        answers = bench.hear(PoseArray, 'objects/poses', qos('objects/poses'))
+
+        def answer(**given):
+            before = len(answers)
+            send(**given)
+            assert bench.spin(lambda: len(answers) > before), [
+                bench.reasons(node) for node in bench.chain]
+            return answers[-1]
+        return stages, answer
+    return make
+
+
+@pytest.fixture
 def chain(bench, make_chain):
     """Return (stages, bench with the active chain, function that sends one frame set)."""
     stages, send = make_chain()

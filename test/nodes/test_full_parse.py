@@ -11,13 +11,8 @@ from hooc_perception.nodes.background import Background
 import pytest
 
 pytest.importorskip('rclpy')
-from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.ros.qos import qos
-from rclpy.lifecycle import TransitionCallbackReturn
+from rclpy.lifecycle import TransitionCallbackReturn  # noqa: E402
 from std_srvs.srv import Trigger
-
-FOLLOWS = {i: {'incremental': True} for i in range(4)}
-FOLLOWS[0]['max_frame_age_s'] = 0.0
 
 
 class Puppet:
@@ -40,23 +35,6 @@ class Puppet:
 
     def discard(self):
         self.is_discarded = True
-
-
-@pytest.fixture
-def live(bench, make_chain):
-    """Return a function of parameters that returns (stages, function that returns an answer)."""
-    def make(**parsing):
-        stages, send = make_chain(parameters={**FOLLOWS, 3: {'incremental': True, **parsing}})
-        answers = bench.hear(PoseArray, 'objects/poses', qos('objects/poses'))
-
-        def answer(**given):
-            before = len(answers)
-            send(**given)
-            assert bench.spin(lambda: len(answers) > before), [
-                bench.reasons(node) for node in bench.chain]
-            return answers[-1]
-        return stages, answer
-    return make
 
 
 @pytest.fixture

@@ -8,34 +8,15 @@ import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
-from geometry_msgs.msg import PoseArray  # noqa: E402
-from hooc_perception.ros.qos import qos
+from hooc_perception.ros.qos import qos  # noqa: E402
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
 
-FOLLOWS = {i: {'incremental': True} for i in range(4)}
-FOLLOWS[0]['max_frame_age_s'] = 0.0
 
-
-@pytest.fixture
-def live(bench, make_chain):
-    """Return (stages, function that sends images and returns the next answer, candidates)."""
-    stages, send = make_chain(parameters=FOLLOWS)
-    answers = bench.hear(PoseArray, 'objects/poses', qos('objects/poses'))
+def test_what_has_not_changed_is_not_decided_anew(bench, live):
+    stages, answer = live()
     candidates = bench.hear(PointCloud2, 'candidates/attributes', qos('candidates/attributes'))
-
-    def answer(**given):
-        before = len(answers)
-        send(**given)
-        assert bench.spin(lambda: len(answers) > before), [
-            bench.reasons(node) for node in bench.chain]
-        return answers[-1]
-    return stages, answer, candidates
-
-
-def test_what_has_not_changed_is_not_decided_anew(live):
-    stages, answer, candidates = live
     first = answer()
     assert len(first.poses) == 2 and candidates[-1].width > 0
     stages.given.clear()
@@ -45,7 +26,7 @@ def test_what_has_not_changed_is_not_decided_anew(live):
 
 
 def test_reset_and_an_emptied_table_are_decided_anew(bench, live):
-    stages, answer, _ = live
+    stages, answer = live()
     answer()
     stages.given.clear()
     reset = bench.peer.create_client(Trigger, 'reset')
@@ -60,7 +41,7 @@ def test_reset_and_an_emptied_table_are_decided_anew(bench, live):
 
 
 def test_events_are_published_where_something_happened(bench, live):
-    stages, answer, _ = live
+    stages, answer = live()
     heard = bench.hear(String, 'objects/events', qos('objects/events'))
     answer()
     answer()

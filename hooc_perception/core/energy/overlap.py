@@ -99,7 +99,6 @@ class OverlapTerm:
         self._compared = 0
         self._union, self._once = np.zeros((2, n, words), np.uint64)
         self._deltas = np.zeros(n, np.int64)
-        self._chosen = np.zeros(0, np.int64)
         self._covered: int | np.int64 = 0
 
     @property
@@ -115,11 +114,10 @@ class OverlapTerm:
     def reset(self, mask: BoolArray) -> None:
         """Start again from the subset `mask` (n,) bool."""
         self._active[:] = mask
-        self._chosen = np.flatnonzero(self._active)
-        rows = self._rows_of(self._chosen)
-        self._covered = kernels.restart(self._chosen, rows, self._active, self._meets,
-                                        self._inside, self._around, self._union, self._once,
-                                        self._deltas)
+        chosen = np.flatnonzero(self._active)
+        rows = self._rows_of(chosen)
+        self._covered = kernels.restart(chosen, rows, self._active, self._meets, self._inside,
+                                        self._around, self._union, self._once, self._deltas)
 
     def deltas(self) -> Float64Array:
         """Return (n,) float64: the change of `value` by each flip."""
@@ -129,12 +127,9 @@ class OverlapTerm:
         """Let object k join the subset, or leave it if it is in."""
         self._covered = self._covered + self._deltas[k]
         self._active[k] = not self._active[k]
-        self._chosen = np.flatnonzero(self._active)
-        if self._row[k] < 0:
-            self._compare(np.array([k]))
-        kernels.update(k, int(self._row[k]), self._chosen, self._row[self._chosen], self._active,
-                       self._meets, self._inside, self._around, self._union, self._once,
-                       self._deltas)
+        chosen, row = np.flatnonzero(self._active), int(self._rows_of(np.array([k]))[0])
+        kernels.update(k, row, chosen, self._row[chosen], self._active, self._meets,
+                       self._inside, self._around, self._union, self._once, self._deltas)
 
     def shares(self, mask: BoolArray) -> Float64Array:
         """Return (m,) float64: v_k of each member of the subset `mask` (n,) bool."""

@@ -35,7 +35,8 @@ TINY = {
                              leaf_pixels=60, tests_per_node=20),),
     'fast': (FusedScenesConfig(scenes=8, quantile_scenes=4, objects_low=2, objects_high=4),
              FitConfig(trees=3, features_per_node=20, min_leaf=5),
-             VerifierConfig(verifier_scenes=4, forest=FitConfig(trees=3, min_leaf=5))),
+             VerifierConfig(verifier_scenes=4, unfamiliar_scenes=0,
+                            forest=FitConfig(trees=3, min_leaf=5))),
 }
 
 CHEAP = [word for text in ('propose.samples=6000', 'propose.pool=30', 'propose.polish=6',

@@ -57,35 +57,42 @@ Population = tuple[tuple[Relative, ...], ...]
 
 
 def relatives_of(models: Sequence[GenericModel], seed: int, jobs: int = 1,
-                 styles: Mapping[str, Sequence[int]] | None = TRAINING) -> Population:
+                 styles: Mapping[str, Sequence[int]] | None = TRAINING,
+                 fold: int | None = None) -> Population:
     """
     Return the Population of the models; the same seed gives the same one for any `jobs`.
 
     :param styles: of each family of the catalogue, those that take part; None = the variants that
         the set gives are the only relatives.
+    :param fold: make only those of this fold; None = all.
     :return: () where no category has a relative.
     """
     population = cast(list[tuple[Relative, ...]], Parallel(n_jobs=jobs)(
-        delayed(_relatives)(model, index, seed, styles) for index, model in enumerate(models)))
+        delayed(_relatives)(model, index, seed, styles, fold)
+        for index, model in enumerate(models)))
     return tuple(population) if any(population) else ()
 
 
 def _relatives(model: GenericModel, index: int, seed: int,
-               styles: Mapping[str, Sequence[int]] | None) -> tuple[Relative, ...]:
-    """Return the relatives of the `index`-th model."""
+               styles: Mapping[str, Sequence[int]] | None,
+               fold: int | None) -> tuple[Relative, ...]:
+    """Return the relatives of the `index`-th model, see `relatives_of`."""
     made = []
     family = family_name(model.name)
+    folds = range(FOLDS) if fold is None else (fold,)
     if styles is not None and family:
         draws = [(style, n % FOLDS, stage_rng(seed, 'relatives', index, style + 1, draw))
-                 for n, style in enumerate(styles[family]) for draw in range(DRAWS)]
+                 for n, style in enumerate(styles[family]) if n % FOLDS in folds
+                 for draw in range(DRAWS)]
         meshes = family_meshes(model, [d[0] for d in draws], [d[2] for d in draws])
-        made = [(_derived(model.name, mesh, rng), fold)
-                for mesh, (_, fold, rng) in zip(meshes, draws)]
+        made = [(_derived(model.name, mesh, rng), own)
+                for mesh, (_, own, rng) in zip(meshes, draws)]
     elif styles is not None:
         made = [(_copy(model, stage_rng(seed, 'relatives', index, 0, k)), k % FOLDS)
-                for k in range(COPIES)]
-    made += [(variant, k % FOLDS) for k, variant in enumerate(model.variants)]
-    return tuple(Relative(shape, pieces_of(shape), fold) for shape, fold in made)
+                for k in range(COPIES) if k % FOLDS in folds]
+    made += [(variant, k % FOLDS) for k, variant in enumerate(model.variants)
+             if k % FOLDS in folds]
+    return tuple(Relative(shape, pieces_of(shape), own) for shape, own in made)
 
 
 def _copy(model: GenericModel, rng: np.random.Generator) -> GenericModel:

@@ -3,9 +3,11 @@
 """
 Learn to verify candidates (core/parsing/verifier.py) from parsed synthetic scenes.
 
-The scenes are not those that the classifier was trained on. Where there are relatives, all
-objects of a scene are made from those of one fold, and only the trees that have never seen this
-fold take part: on shapes that it knows a classifier looks better than it is.
+The scenes are not those that the classifier was trained on. On shapes that it knows, a classifier
+looks better than it is; that is why the objects of half of the scenes are made from relatives
+(synthesis/population.py), which the classifier has never seen. Where it was trained on relatives,
+all objects of a scene are made from those of one fold, and only the trees that have never seen
+this fold take part.
 """
 
 from collections.abc import Callable
@@ -19,8 +21,9 @@ from hooc_perception.core.parsing.verifier import FEATURES, features
 from hooc_perception.core.profiles import profile
 from hooc_perception.core.types import Camera
 from hooc_perception.errors import HoocError
+from hooc_perception.objects.catalogue import TRAINING
 from hooc_perception.parser import Parser
-from hooc_perception.synthesis.population import FOLDS, Population
+from hooc_perception.synthesis.population import FOLDS, Population, relatives_of
 from hooc_perception.synthesis.strangers import STRANGER
 from hooc_perception.synthesis.training_scenes import training_scene, TrainingConfig
 from hooc_perception.training.context import Arrays, TrainingContext
@@ -35,12 +38,21 @@ from hooc_perception.training.fused_scenes import FusedScenesConfig, scene_confi
 from joblib import delayed, Parallel
 import numpy as np
 
+# The fold of the relatives in unfamiliar scenes: a third of the shapes is enough for them.
+UNFAMILIAR = 0
+# A verifier that may ask for the category learns how its objects look in training.
+NOT_LEARNED = ('category',)
+
 
 @dataclass(frozen=True)
 class VerifierConfig(Config):
     """How many scenes the verifier sees and when a candidate counts as right."""
 
     verifier_scenes: int = param(60, 'Synthetic scenes to parse.', '', 4, 100000)
+    unfamiliar_scenes: int = param(60, 'Further scenes, of objects that share only the name with '
+                                   'the generic meshes. Where the classifier was trained on such '
+                                   'objects, all scenes consist of them, and there are no '
+                                   'further ones.', '', 0, 100000)
     random_rigs: float = param(0.2, 'Share of scenes seen by another rig of one to four cameras.',
                                '', 0.0, 1.0)
     reshape_low: float = param(0.7, 'Smallest deformation of the objects.',
@@ -108,31 +120,49 @@ def verifier_table(context: TrainingContext, config: VerifierConfig,
 
     :param progress: called with 1 after every scene.
     """
-    fused = next((c for c in context.configs if isinstance(c, FusedScenesConfig)),
-                 FusedScenesConfig())
-    limit = context.max_instances
-    judges = ([unaware_of(context.classifier, fold, 'forest_') for fold in range(FOLDS)]
-              if context.population else [context.classifier])
-    scenes = _Scenes(
-        tuple(Parser(context.models, judge, profile(context.profile), limit) for judge in judges),
-        context.population, context.cameras, config, scene_config(fused, min(limit, 4) or 3),
-        context.seed)
+    groups = [_scenes_of(context, config, context.population)]
+    counts = [config.verifier_scenes]
+    if config.unfamiliar_scenes and not context.population:
+        groups.append(_scenes_of(context, config, relatives_of(
+            context.models, context.seed, context.jobs, TRAINING, UNFAMILIAR), UNFAMILIAR))
+        counts.append(config.unfamiliar_scenes)
     parts = []
     with Parallel(n_jobs=context.jobs, return_as='generator') as parallel:
         for part in parallel(delayed(_Scenes.parsed)(scenes, k)
-                             for k in range(config.verifier_scenes)):
+                             for scenes, n in zip(groups, counts) for k in range(n)):
             parts.append(part)
             if progress:
                 progress(1)
     return np.concatenate([x for x, _ in parts]), np.concatenate([y for _, y in parts])
 
 
+def _scenes_of(context: TrainingContext, config: VerifierConfig, population: Population,
+               fold: int | None = None) -> _Scenes:
+    """
+    Return the _Scenes of a population.
+
+    :param fold: all relatives are of this fold, and the classifier knows none of them; None = it
+        knows those of all folds.
+    """
+    fused = next((c for c in context.configs if isinstance(c, FusedScenesConfig)),
+                 FusedScenesConfig())
+    limit = context.max_instances
+    judges = ([unaware_of(context.classifier, each, 'forest_') for each in range(FOLDS)]
+              if population and fold is None else [context.classifier])
+    return _Scenes(
+        tuple(Parser(context.models, judge, profile(context.profile), limit) for judge in judges),
+        population, context.cameras, config, scene_config(fused, min(limit, 4) or 3),
+        context.seed)
+
+
 def fit_verifier(context: TrainingContext, config: VerifierConfig) -> Arrays:
     """Return the arrays of a verifier, `verifier_*`."""
-    with context.bar(config.verifier_scenes, 'parsed scenes', 'scene') as bar:
+    further = 0 if context.population else config.unfamiliar_scenes
+    with context.bar(config.verifier_scenes + further, 'parsed scenes', 'scene') as bar:
         x, right = verifier_table(context, config, bar.update)
     if not len(x) or right.min() == right.max():
         return {}
+    x[:, [FEATURES.index(name) for name in NOT_LEARNED]] = 0
     rng = stage_rng(context.seed, 'verifier')
     cuts = thresholds(x, config.forest.bins, rng)
     forest = fit(quantise(x, cuts), right, 2, cuts, config.forest, rng, context.jobs)

@@ -44,6 +44,14 @@ def test_the_seed_decides_whatever_the_jobs(families, population):
         np.testing.assert_array_equal(a.model.vertices, b.model.vertices)
 
 
+def test_one_fold_is_what_all_have_of_it(families, population):
+    for alone, everyone in zip(relatives_of(families, 3, fold=1), population, strict=True):
+        same = [relative for relative in everyone if relative.fold == 1]
+        assert {relative.fold for relative in alone} == {1}
+        for a, b in zip(alone, same, strict=True):
+            np.testing.assert_array_equal(a.model.vertices, b.model.vertices)
+
+
 def test_objects_are_made_from_variants(families, population):
     maker, rng = BodyMaker(families, population), np.random.default_rng(0)
     bodies = [maker.body(1, rng, fold=1) for _ in range(40)]

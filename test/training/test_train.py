@@ -27,7 +27,8 @@ TINY = {
                              leaf_pixels=300, tests_per_node=60),),
     'fast': (FusedScenesConfig(scenes=10, quantile_scenes=4, objects_low=3, probes=16),
              FitConfig(trees=5, features_per_node=40, min_leaf=5),
-             VerifierConfig(verifier_scenes=4, forest=FitConfig(trees=4, features_per_node=9))),
+             VerifierConfig(verifier_scenes=4, unfamiliar_scenes=2,
+                            forest=FitConfig(trees=4, features_per_node=9))),
 }
 
 
@@ -107,6 +108,10 @@ def test_a_verifier_is_learned_where_the_profile_has_one(trained):
     x = np.random.default_rng(0).normal(size=(50, len(FEATURES))).astype(np.float32)
     p = verifier.probability(x)
     assert ((p >= 0) & (p <= 1)).all() and np.ptp(p) > 0
+    # How the objects of one category look in training is not to be learned.
+    other = x.copy()
+    other[:, FEATURES.index('category')] *= -1
+    np.testing.assert_array_equal(verifier.probability(other), p)
 
 
 def test_rows_favour_small_classes():

@@ -22,6 +22,7 @@ from hooc_perception.core.classification.forest import Forest
 from hooc_perception.core.energy.joint import JointEnergy
 from hooc_perception.core.frame.evidence import Evidence
 from hooc_perception.core.frame.kernels import compare as kernel
+from hooc_perception.core.frame.kernels.outline import outlines
 from hooc_perception.core.frame.kernels.pixel_lists import mean_probabilities, PixelLists
 from hooc_perception.core.parsing.search import Search
 from hooc_perception.core.types import Candidates, GenericModel
@@ -32,7 +33,11 @@ FEATURES = (
     'margin', 'margin a pixel', 'category margin', 'log pixels', 'agree', 'behind', 'violate',
     'missing', 'gain', 'cosine', 'residual', 'share', 'unlikeliness', 'delta', 'scale',
     'largest scale', 'spread of scale', 'height', 'views', 'foreground', 'own p', 'rank of p',
-    'p against best', 'classes', 'log generic area', 'slimness', 'category')
+    'p against best', 'classes', 'log generic area', 'slimness', 'category', 'open outline',
+    'ending outline')
+
+# A verifier may know only so many of them, from the first on.
+FIRST_FEATURES = 27
 
 
 class Verifier:
@@ -56,8 +61,10 @@ class Verifier:
         if 'verifier_feature' not in classifier:
             return None
         forest = Forest.from_arrays(classifier, 'verifier_')
-        if (forest.feature.max() >= len(FEATURES) or forest.leaf_p.shape[1] != 2
-                or int(classifier.get('verifier_features', 0)) != len(FEATURES)):
+        known = int(classifier.get('verifier_features', 0))
+        # Features are added at the end, so that a verifier of before still reads its own.
+        if (forest.feature.max() >= known or forest.leaf_p.shape[1] != 2
+                or not FIRST_FEATURES <= known <= len(FEATURES)):
             raise HoocError('the verifier of the model does not fit this version; train again')
         return Verifier(forest)
 
@@ -129,7 +136,8 @@ def features(search: Search) -> Float32Array:
         scale.mean(1), np.abs(scale).max(1), np.ptp(scale, axis=1), pool.translation[:, 2],
         stats[:, kernel.VIEWS], foreground, own, (rest > own[:, None]).sum(1),
         np.log((own + 0.01) / (rival + 0.01)), np.full(n, p.shape[1] - 1), np.log(area),
-        ordered[:, 2] / np.maximum(ordered[:, 0], 1e-4), pool.category)
+        ordered[:, 2] / np.maximum(ordered[:, 0], 1e-4), pool.category,
+        *outlines(search.lists, evidence.views).T)
     return np.column_stack(columns).astype(np.float32)
 
 

@@ -14,6 +14,7 @@ from hooc_perception.core.parsing.search import Search, search_scene
 from hooc_perception.core.parsing.verifier import (
     FEATURES,
     features,
+    FIRST_FEATURES,
     margins,
     siblings_of,
     Verifier,
@@ -118,5 +119,11 @@ def test_a_model_without_one_is_served_and_a_foreign_one_refused(state):
             'verifier_features': np.uint8(len(FEATURES))}
     x = np.zeros((2, len(FEATURES)), np.float32)
     np.testing.assert_allclose(Verifier.from_arrays(leaf).probability(x), 0.8)
-    with pytest.raises(HoocError, match='train again'):
-        Verifier.from_arrays({**leaf, 'verifier_features': np.uint8(3)})
+    # One from before the outline was looked at reads the features that it knows.
+    before = {**leaf, 'verifier_features': np.uint8(FIRST_FEATURES)}
+    np.testing.assert_allclose(Verifier.from_arrays(before).probability(x), 0.8)
+    for foreign in ({'verifier_features': np.uint8(3)},
+                    {'verifier_features': np.uint8(len(FEATURES) + 1)},
+                    {**before, 'verifier_feature': np.array([FIRST_FEATURES], np.int32)}):
+        with pytest.raises(HoocError, match='train again'):
+            Verifier.from_arrays({**leaf, **foreign})

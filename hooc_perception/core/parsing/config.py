@@ -13,7 +13,7 @@ from hooc_perception.core.frame.costs import ObjectCosts, PixelCosts
 class VerdictConfig(Config):
     """How much the verifier's probabilities count against the energy."""
 
-    verify_weight: float = param(80.0, 'Weight of the log odds that the verifier gives a '
+    verify_weight: float = param(160.0, 'Weight of the log odds that the verifier gives a '
                                  'candidate; 0 = the energy decides alone.', 'px', 0.0, 1000.0)
     missing_against_false: float = param(3.0, 'How much worse a missed object is than a false '
                                          'one.', '', 0.01, 100.0)

@@ -122,8 +122,13 @@ def test_a_model_without_one_is_served_and_a_foreign_one_refused(state):
     # One from before the outline was looked at reads the features that it knows.
     before = {**leaf, 'verifier_features': np.uint8(FIRST_FEATURES)}
     np.testing.assert_allclose(Verifier.from_arrays(before).probability(x), 0.8)
+    asks = {'verifier_feature': np.array([FIRST_FEATURES, -1, -1], np.int32),
+            'verifier_threshold': np.zeros(3, np.float32),
+            'verifier_left': np.array([1, 0, 0], np.int32),
+            'verifier_leaf': np.zeros(3, np.int32)}
+    np.testing.assert_allclose(Verifier.from_arrays({**leaf, **asks}).probability(x), 0.8)
     for foreign in ({'verifier_features': np.uint8(3)},
                     {'verifier_features': np.uint8(len(FEATURES) + 1)},
-                    {**before, 'verifier_feature': np.array([FIRST_FEATURES], np.int32)}):
+                    {**asks, 'verifier_features': np.uint8(FIRST_FEATURES)}):
         with pytest.raises(HoocError, match='train again'):
             Verifier.from_arrays({**leaf, **foreign})

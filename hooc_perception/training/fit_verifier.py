@@ -10,7 +10,7 @@ all objects of a scene are made from those of one fold, and only the trees that 
 this fold take part.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from hooc_perception.core.arrays import Float32Array, UInt8Array
@@ -70,12 +70,12 @@ class _Scenes:
     """
     Synthetic scenes, parsed by the chain that the verifier is for.
 
-    :ivar parsers: for each fold, with the trees that have not seen it; one where there are no
-        relatives.
+    :ivar parsers: by fold of the population, with a classifier that has not seen it; by None
+        where there is no population.
     :ivar base: what the scenes look like, before rig and deformation are drawn.
     """
 
-    parsers: tuple[Parser, ...]
+    parsers: dict[int | None, Parser]
     population: Population
     cameras: tuple[Camera, ...]
     config: VerifierConfig
@@ -88,8 +88,8 @@ class _Scenes:
 
         :raises HoocError: where the parser's method has no verifier.
         """
-        config, seed, fold = self.config, self.seed, k % len(self.parsers)
-        parser = self.parsers[fold]
+        config, seed = self.config, self.seed
+        fold, parser = list(self.parsers.items())[k % len(self.parsers)]
         rng = stage_rng(seed, 'verifier scenes', k)
         rig = 'random' if rng.random() < config.random_rigs else 'jittered'
         strength = float(rng.uniform(config.reshape_low, config.reshape_high))
@@ -112,54 +112,52 @@ class _Scenes:
         return x, right
 
 
-def verifier_table(context: TrainingContext, config: VerifierConfig,
-                   progress: Callable[[int], object] | None = None,
-                   ) -> tuple[Float32Array, UInt8Array]:
+def verifier_table(groups: Sequence[tuple[_Scenes, int]], jobs: int,
+                   progress: Callable[[int], object]) -> tuple[Float32Array, UInt8Array]:
     """
     Return (x (n, FEATURES) float32, right (n,) uint8) of the candidates of all scenes.
 
+    :param groups: scenes, and how many of them.
     :param progress: called with 1 after every scene.
     """
-    groups = [_scenes_of(context, config, context.population)]
-    counts = [config.verifier_scenes]
-    if config.unfamiliar_scenes and not context.population:
-        groups.append(_scenes_of(context, config, relatives_of(
-            context.models, context.seed, context.jobs, TRAINING, UNFAMILIAR), UNFAMILIAR))
-        counts.append(config.unfamiliar_scenes)
     parts = []
-    with Parallel(n_jobs=context.jobs, return_as='generator') as parallel:
+    with Parallel(n_jobs=jobs, return_as='generator') as parallel:
         for part in parallel(delayed(_Scenes.parsed)(scenes, k)
-                             for scenes, n in zip(groups, counts) for k in range(n)):
+                             for scenes, n in groups for k in range(n)):
             parts.append(part)
-            if progress:
-                progress(1)
+            progress(1)
     return np.concatenate([x for x, _ in parts]), np.concatenate([y for _, y in parts])
 
 
-def _scenes_of(context: TrainingContext, config: VerifierConfig, population: Population,
-               fold: int | None = None) -> _Scenes:
-    """
-    Return the _Scenes of a population.
-
-    :param fold: all relatives are of this fold, and the classifier knows none of them; None = it
-        knows those of all folds.
-    """
+def _groups(context: TrainingContext, config: VerifierConfig) -> list[tuple[_Scenes, int]]:
+    """Return the kinds of scenes that a verifier learns from, and how many of each."""
     fused = next((c for c in context.configs if isinstance(c, FusedScenesConfig)),
                  FusedScenesConfig())
     limit = context.max_instances
-    judges = ([unaware_of(context.classifier, each, 'forest_') for each in range(FOLDS)]
-              if population and fold is None else [context.classifier])
-    return _Scenes(
-        tuple(Parser(context.models, judge, profile(context.profile), limit) for judge in judges),
-        population, context.cameras, config, scene_config(fused, min(limit, 4) or 3),
-        context.seed)
+
+    def scenes(population: Population, judges: Mapping[int | None, Arrays]) -> _Scenes:
+        parsers = {fold: Parser(context.models, judge, profile(context.profile), limit)
+                   for fold, judge in judges.items()}
+        return _Scenes(parsers, population, context.cameras, config,
+                       scene_config(fused, min(limit, 4) or 3), context.seed)
+
+    if context.population:
+        judges: dict[int | None, Arrays] = {
+            fold: unaware_of(context.classifier, fold, 'forest_') for fold in range(FOLDS)}
+        return [(scenes(context.population, judges), config.verifier_scenes)]
+    groups = [(scenes((), {None: context.classifier}), config.verifier_scenes)]
+    if config.unfamiliar_scenes:
+        shapes = relatives_of(context.models, context.seed, context.jobs, TRAINING, UNFAMILIAR)
+        groups.append((scenes(shapes, {UNFAMILIAR: context.classifier}),
+                       config.unfamiliar_scenes))
+    return groups
 
 
 def fit_verifier(context: TrainingContext, config: VerifierConfig) -> Arrays:
     """Return the arrays of a verifier, `verifier_*`."""
-    further = 0 if context.population else config.unfamiliar_scenes
-    with context.bar(config.verifier_scenes + further, 'parsed scenes', 'scene') as bar:
-        x, right = verifier_table(context, config, bar.update)
+    groups = _groups(context, config)
+    with context.bar(sum(n for _, n in groups), 'parsed scenes', 'scene') as bar:
+        x, right = verifier_table(groups, context.jobs, bar.update)
     if not len(x) or right.min() == right.max():
         return {}
     x[:, [FEATURES.index(name) for name in NOT_LEARNED]] = 0

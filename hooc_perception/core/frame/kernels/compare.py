@@ -110,7 +110,7 @@ def _cosine(subject: Subject, face: int, eye: Float64Array, normals: Float32Arra
 
 
 @nb.njit(cache=True, inline='always')
-def _ray(views: Views, view: int, column: int, row: int) -> tuple[float, float, float]:
+def ray(views: Views, view: int, column: int, row: int) -> tuple[float, float, float]:
     """Return the direction of a pixel's ray in the world, one metre deep."""
     K, R = views.K, views.R
     x = (column - K[view, 0, 2]) / K[view, 0, 0]
@@ -222,7 +222,7 @@ def _compare_view(subject: Subject, target: Target, view: int, sums: Sums, at: i
                 if sums.equations.shape[0] and cosine > MIN_COSINE and has_normal:
                     normal = normals[i, 0], normals[i, 1], normals[i, 2]
                     _add_point_to_plane(subject, sums.equations, eye,
-                                        _ray(views, view, x + u0, y + v0), (z, d, cosine),
+                                        ray(views, view, x + u0, y + v0), (z, d, cosine),
                                         normal, weights.tolerance_m)
                 if len(views.patch_size) and views.patch[i] >= 0:
                     _count_patch(sums, views.patch[i])

@@ -11,6 +11,7 @@ hypothesis covers a part of something larger.
 from typing import NamedTuple
 
 from hooc_perception.core.arrays import BoolArray, Float64Array
+from hooc_perception.core.frame.kernels.compare import ray
 from hooc_perception.core.frame.kernels.pixel_lists import PixelLists
 from hooc_perception.core.frame.kernels.records import Views
 import numba as nb
@@ -43,18 +44,6 @@ class _Window(NamedTuple):
 
 
 @nb.njit(cache=True, inline='always')
-def _point(views: Views, view: int, column: int, row: int, depth: float,
-           ) -> tuple[float, float, float]:
-    """Return a reading in axes parallel to the world's, seen from the camera, metres."""
-    K, R = views.K, views.R
-    x = (column - K[view, 0, 2]) / K[view, 0, 0] * depth
-    y = (row - K[view, 1, 2]) / K[view, 1, 1] * depth
-    return (R[view, 0, 0] * x + R[view, 1, 0] * y + R[view, 2, 0] * depth,
-            R[view, 0, 1] * x + R[view, 1, 1] * y + R[view, 2, 1] * depth,
-            R[view, 0, 2] * x + R[view, 1, 2] * y + R[view, 2, 2] * depth)
-
-
-@nb.njit(cache=True, inline='always')
 def _beyond(views: Views, view: int, here: tuple[int, int], there: tuple[int, int]) -> int:
     """Return OPEN, ENDING or HIDDEN for the step from one (column, row) to another."""
     width = views.size[view, 0]
@@ -67,9 +56,9 @@ def _beyond(views: Views, view: int, here: tuple[int, int], there: tuple[int, in
         return ENDING
     if n[i, 0] * n[j, 0] + n[i, 1] * n[j, 1] + n[i, 2] * n[j, 2] < SMOOTH_COSINE:
         return ENDING
-    a = _point(views, view, here[0], here[1], d)
-    b = _point(views, view, there[0], there[1], e)
-    off = (n[i, 0] * (b[0] - a[0]) + n[i, 1] * (b[1] - a[1]) + n[i, 2] * (b[2] - a[2]))
+    a, b = ray(views, view, here[0], here[1]), ray(views, view, there[0], there[1])
+    off = (n[i, 0] * (b[0] * e - a[0] * d) + n[i, 1] * (b[1] * e - a[1] * d)
+           + n[i, 2] * (b[2] * e - a[2] * d))
     return OPEN if abs(off) < PLANE_M else ENDING
 
 

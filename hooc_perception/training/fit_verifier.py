@@ -48,8 +48,8 @@ NOT_LEARNED = ('category',)
 class VerifierConfig(Config):
     """How many scenes the verifier sees and when a candidate counts as right."""
 
-    verifier_scenes: int = param(60, 'Synthetic scenes to parse.', '', 4, 100000)
-    unfamiliar_scenes: int = param(60, 'Further scenes, of objects that share only the name with '
+    verifier_scenes: int = param(30, 'Synthetic scenes to parse.', '', 4, 100000)
+    unfamiliar_scenes: int = param(30, 'Further scenes, of objects that share only the name with '
                                    'the generic meshes. Where the classifier was trained on such '
                                    'objects, all scenes consist of them, and there are no '
                                    'further ones.', '', 0, 100000)

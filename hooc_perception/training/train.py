@@ -40,7 +40,7 @@ PROFILES: dict[str, tuple[Config, ...]] = {
     'paper': (fit_pixels.PixelFitConfig(),),
     'best': (FusedScenesConfig(), FitConfig(), VerifierConfig()),
     'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24),
-             VerifierConfig(verifier_scenes=30, unfamiliar_scenes=0)),
+             VerifierConfig(unfamiliar_scenes=0)),
 }
 
 

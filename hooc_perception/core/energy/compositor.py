@@ -10,6 +10,8 @@ A search needs the following from an energy, and nothing else:
     value       its energy
     deltas()    (n,) float64, how the energy changes if candidate k flips (joins or leaves);
                 inf where it must not join
+    deltas_without(members)  (m, n) float64, for each member the change by adding each outsider
+                once that member has left; inf for members, and where it must not join
     flip(k)     flip it
     reset(mask) start again from a subset
     evaluate(mask)  the energy of any subset, without touching the current one
@@ -37,6 +39,7 @@ from hooc_perception.core.arrays import (
     Int64Array,
 )
 from hooc_perception.core.energy.kernels import compositor as kernels
+from hooc_perception.core.energy.kernels import compositor_layout as layout
 from hooc_perception.core.energy.kernels.compositor import Lists, Runs
 from hooc_perception.errors import HoocError
 import numba as nb
@@ -79,7 +82,7 @@ class Compositor:
         cost_none = self._rounded(cost_none)
         self._unseen = float(cost_none[~seen].sum())
         self._unary = self._rounded(unary)
-        owner, slot_cost, self._run, self._entry = kernels.build(
+        owner, slot_cost, self._run, self._entry = layout.build(
             offsets, (np.cumsum(seen) - 1)[pixel].astype(np.int32), depth,
             self._rounded(cost).astype(np.float32), cost_none[self.pixels].astype(np.float32),
             nb.get_num_threads())
@@ -130,6 +133,24 @@ class Compositor:
         if limited and self._max_per_group:
             full = self._count >= self._max_per_group
             deltas[~active & full[self._group]] = np.inf
+        return deltas
+
+    def deltas_without(self, members: Int64Array) -> Float64Array:
+        """
+        Return (m, n) float64: the change of `value` by adding each outsider once a member left.
+
+        What flipping member i and then asking for `deltas` would give in row i; inf for members.
+
+        :param members: (m,) int64 of the current subset.
+        """
+        deltas = kernels.deltas_without(members, self._lists, self._runs, self._active,
+                                        self._first, self._second, self._deltas)[:, :self.n]
+        deltas += self._unary
+        deltas[:, self._active[:self.n]] = np.inf
+        if self._max_per_group:
+            group = self._group[members, None]
+            count = self._count[self._group] - (group == self._group)
+            deltas[count >= self._max_per_group] = np.inf
         return deltas
 
     def flip(self, k: int) -> None:
@@ -191,15 +212,15 @@ def _check(offsets: Int64Array, pixel: Int64Array, depth: Float32Array, cost: Fl
 def _merged(start: Int32Array, owner: Int32Array, cost: Float32Array,
             n: int) -> tuple[AnyArray, Lists, Runs]:
     """Return (kind of each pixel, its Lists, its Runs) of pixels merged by equal owners."""
-    _, example, kind = np.unique(kernels.fingerprints(start, owner), return_index=True,
+    _, example, kind = np.unique(layout.fingerprints(start, owner), return_index=True,
                                  return_inverse=True)
     # Number the kinds as they come in the images: neighbours stay neighbours in memory.
     order = np.argsort(example)
     rank = np.empty_like(order)
     rank[order] = np.arange(len(order))
     kind, example = rank[kind], example[order]
-    same, lists, runs = kernels.merge(start, owner, cost, n, kind, example)
+    same, lists, runs = layout.merge(start, owner, cost, n, kind, example)
     if not same:  # two fingerprints in 2^64 collided: do without merging
         kind = np.arange(len(kind))
-        _, lists, runs = kernels.merge(start, owner, cost, n, kind, kind)
+        _, lists, runs = layout.merge(start, owner, cost, n, kind, kind)
     return kind, lists, runs

@@ -119,6 +119,14 @@ class Eq1(ImagesAndVolumes):
         mean = (shares + self._overlap.deltas()) / np.maximum(n + np.where(mask, -1, 1), 1)
         return self._images.deltas() / self.n_pixels + mean - shares / max(n, 1)
 
+    def deltas_without(self, members: Int64Array) -> Float64Array:
+        """Return (m, n) float64: the change by adding each outsider once a member has left."""
+        n = np.count_nonzero(self._images.mask) - 1
+        shares = (self._overlap.value + self._overlap.deltas()[members])[:, None]
+        mean = (shares + self._overlap.deltas_without(members)) / (n + 1)
+        return (self._images.deltas_without(members) / self.n_pixels + mean
+                - shares / max(n, 1))
+
     def evaluate(self, mask: BoolArray) -> float:
         """Return E of the subset `mask` (n,) bool; the current one stays."""
         n = max(np.count_nonzero(mask), 1)

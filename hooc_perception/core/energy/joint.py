@@ -13,7 +13,7 @@ k covers; v_k the share of its volume inside others.
 
 from collections.abc import Sequence
 
-from hooc_perception.core.arrays import BoolArray, Float64Array
+from hooc_perception.core.arrays import BoolArray, Float64Array, Int64Array
 from hooc_perception.core.energy.compositor import Compositor
 from hooc_perception.core.energy.images_and_volumes import ImagesAndVolumes
 from hooc_perception.core.energy.overlap import OverlapTerm
@@ -69,6 +69,11 @@ class JointEnergy(ImagesAndVolumes):
     def deltas(self) -> Float64Array:
         """Return (n,) float64: the change by each flip, inf where it is not allowed."""
         return self._images.deltas() + self._weight * self._overlap.deltas()
+
+    def deltas_without(self, members: Int64Array) -> Float64Array:
+        """Return (m, n) float64: the change by adding each outsider once a member has left."""
+        return (self._images.deltas_without(members)
+                + self._weight * self._overlap.deltas_without(members))
 
     def joining_costs(self) -> Float64Array:
         """Return (n,) float64: the cost of adding each candidate, whatever the group's limit."""

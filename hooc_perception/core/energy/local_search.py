@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
-from hooc_perception.core.arrays import BoolArray, Float64Array
+from hooc_perception.core.arrays import BoolArray, Float64Array, Int64Array
 from hooc_perception.core.config import Config, param
 import numpy as np
 
@@ -38,6 +38,14 @@ class SearchableEnergy(Protocol):
 
     def deltas(self) -> Float64Array:
         """Return (n,) float64: the change by each flip, inf where it is not allowed."""
+        ...
+
+    def deltas_without(self, members: Int64Array) -> Float64Array:
+        """
+        Return (m, n) float64: the change by adding each outsider once a member has left.
+
+        Inf for members, and where the outsider is not allowed.
+        """
         ...
 
     def flip(self, k: int) -> None:
@@ -97,6 +105,10 @@ class HeldEnergy:
         """Return (n,) float64: the change by each flip, inf where it is held."""
         return np.where(self._held, np.inf, self._energy.deltas())
 
+    def deltas_without(self, members: Int64Array) -> Float64Array:
+        """Return (m, n) float64: as the energy's, inf where the outsider is held."""
+        return np.where(self._held, np.inf, self._energy.deltas_without(members))
+
     def flip(self, k: int) -> None:
         """Add candidate k to the subset, or remove it."""
         self._energy.flip(k)
@@ -126,31 +138,22 @@ def greedy(energy: SearchableEnergy, stop: Stop | None = None) -> None:
             raise OutOfTimeError
 
 
-def best_swap(energy: SearchableEnergy, stop: Stop | None = None) -> bool:
+def best_swap(energy: SearchableEnergy) -> bool:
     """
     Make the best exchange of one member for one outsider if it lowers the energy.
 
     :return: whether it did.
     """
-    best, pair = -TINY, None
-    for a in np.flatnonzero(energy.mask).tolist():
-        leaves = energy.deltas()[a]
-        if not np.isfinite(leaves):
-            continue
-        energy.flip(a)
-        deltas = energy.deltas()
-        deltas[a] = np.inf
-        deltas[energy.mask] = np.inf
-        b = int(np.argmin(deltas))
-        if leaves + deltas[b] < best:
-            best, pair = leaves + deltas[b], (a, b)
-        energy.flip(a)
-        if stop is not None and stop():
-            raise OutOfTimeError
-    if pair is None:
+    deltas, members = energy.deltas(), np.flatnonzero(energy.mask)
+    members = members[np.isfinite(deltas[members])]
+    if not len(members):
         return False
-    for k in pair:
-        energy.flip(k)
+    changes = deltas[members, None] + energy.deltas_without(members)
+    row, joins = np.unravel_index(np.argmin(changes), changes.shape)
+    if changes[row, joins] >= -TINY:
+        return False
+    for k in (members[row], joins):
+        energy.flip(int(k))
     return True
 
 
@@ -168,9 +171,11 @@ def descend(energy: SearchableEnergy, config: LocalSearchConfig = LocalSearchCon
         reached = energy.mask.tobytes()
         if not config.swaps or reached in optima:
             return
-        if not best_swap(energy, stop):
+        if not best_swap(energy):
             optima.add(reached)
             return
+        if stop is not None and stop():
+            raise OutOfTimeError
 
 
 def local_search(energy: SearchableEnergy, rng: np.random.Generator,

@@ -17,6 +17,7 @@ from collections.abc import Sequence
 
 from hooc_perception.core.arrays import BoolArray, Float64Array, Int64Array
 from hooc_perception.core.energy.kernels import overlap as kernels
+from hooc_perception.core.energy.kernels import overlap_flips as flips
 from hooc_perception.core.memo import per_model
 from hooc_perception.core.types import Candidates, GenericModel
 import numpy as np
@@ -116,19 +117,30 @@ class OverlapTerm:
         self._active[:] = mask
         chosen = np.flatnonzero(self._active)
         rows = self._rows_of(chosen)
-        self._covered = kernels.restart(chosen, rows, self._active, self._meets, self._inside,
+        self._covered = flips.restart(chosen, rows, self._active, self._meets, self._inside,
                                         self._around, self._union, self._once, self._deltas)
 
     def deltas(self) -> Float64Array:
         """Return (n,) float64: the change of `value` by each flip."""
         return self._deltas / self._count
 
+    def deltas_without(self, members: Int64Array) -> Float64Array:
+        """
+        Return (m, n) float64: the change of `value` by adding each object once a member has left.
+
+        :param members: (m,) int64 of the current subset; what their columns hold is undefined.
+        """
+        chosen = np.flatnonzero(self._active)
+        return flips.deltas_without(
+            members, self._rows_of(members), chosen, self._row[chosen], self._active,
+            self._meets, self._inside, self._around, self._union, self._deltas) / self._count
+
     def flip(self, k: int) -> None:
         """Let object k join the subset, or leave it if it is in."""
         self._covered = self._covered + self._deltas[k]
         self._active[k] = not self._active[k]
         chosen, row = np.flatnonzero(self._active), int(self._rows_of(np.array([k]))[0])
-        kernels.update(k, row, chosen, self._row[chosen], self._active, self._meets,
+        flips.update(k, row, chosen, self._row[chosen], self._active, self._meets,
                        self._inside, self._around, self._union, self._once, self._deltas)
 
     def shares(self, mask: BoolArray) -> Float64Array:
@@ -136,7 +148,7 @@ class OverlapTerm:
         members = np.flatnonzero(mask)
         counts = np.zeros(len(members), np.int64)
         rows = self._rows_of(members)
-        kernels.covered(members, rows, self._meets, self._around, counts)
+        flips.covered(members, rows, self._meets, self._around, counts)
         return counts / self._count
 
     def pairwise(self) -> Float64Array:

@@ -81,20 +81,17 @@ def margins(energy: JointEnergy, siblings: BoolArray) -> Float64Array:
     other candidates for the same object. One exchange may make up for the change, which is what
     a local optimum leaves to gain. Negative: the scene is explained worse without that object.
 
-    :param energy: JointEnergy at its optimum; it is left there.
+    :param energy: JointEnergy at its optimum.
     :param siblings: (n, n) bool, symmetric, True on the diagonal.
     """
     members = np.flatnonzero(energy.mask)
     joining = np.where(energy.mask, 0.0, energy.joining_costs())
     leave = energy.deltas()[members]
+    swapped = leave[:, None] + energy.deltas_without(members)
+    joining = np.minimum(joining, swapped.min(axis=0, initial=np.inf))
     without = np.full(energy.n, -np.inf)
-    for i, a in enumerate(members.tolist()):
-        energy.flip(a)
-        swapped = leave[i] + energy.deltas()
-        energy.flip(a)
-        swapped[members] = np.inf
-        joining = np.minimum(joining, swapped)
-        replaced = np.where(siblings[a], np.inf, swapped).min(initial=leave[i])
+    for i, a in enumerate(members):
+        replaced = np.where(siblings[a], np.inf, swapped[i]).min(initial=leave[i])
         without[siblings[a]] = np.maximum(without[siblings[a]], replaced)
     joining[members] = 0.0
     return joining - np.where(np.isfinite(without), without, 0.0)

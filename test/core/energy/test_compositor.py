@@ -55,6 +55,19 @@ def test_every_flip_of_a_long_walk_agrees_with_the_reference(ties):
         assert np.array_equal(energy.mask, mask)
 
 
+@pytest.mark.parametrize('most', [0, 1, 2])
+@pytest.mark.parametrize('ties', [False, True])
+def test_deltas_without_a_member_equal_those_after_its_flip(ties, most, deltas_by_flips):
+    rng = np.random.default_rng(7)
+    energy = Compositor(*random_lists(rng, 30, ties=ties), np.arange(30) % 7, most)
+    for share in (0.0, 0.1, 0.4, 0.9):
+        energy.reset(rng.random(30) < share)
+        members, before = np.flatnonzero(energy.mask), energy.deltas()
+        without = energy.deltas_without(members)
+        assert np.array_equal(energy.deltas(), before)
+        assert np.array_equal(without, deltas_by_flips(energy, members))
+
+
 def test_reset_equals_the_flips_that_lead_there():
     rng = np.random.default_rng(2)
     lists = random_lists(rng)
@@ -143,7 +156,7 @@ def test_pixels_with_the_same_candidates_in_the_same_order_are_merged():
 def test_colliding_fingerprints_change_nothing(monkeypatch):
     lists = random_lists(np.random.default_rng(5))
     expected = Compositor(*lists)
-    monkeypatch.setattr(compositor.kernels, 'fingerprints',
+    monkeypatch.setattr(compositor.layout, 'fingerprints',
                         lambda start, owner: np.zeros(len(start) - 1, np.uint64))
     colliding = Compositor(*lists)
     mask = np.arange(12) % 3 == 0

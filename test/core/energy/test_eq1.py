@@ -192,6 +192,17 @@ def test_every_flip_of_a_walk_agrees_with_the_whole():
     assert eq1.value == eq1.evaluate(np.zeros(len(pool), bool))
 
 
+@pytest.mark.parametrize('most', [0, 1])
+def test_deltas_without_a_member_equal_those_after_its_flip(most, deltas_by_flips):
+    rng = np.random.default_rng(11)
+    observation, probabilities, pool = rendered(rng)
+    eq1 = Eq1(observation, probabilities, pool, MODELS, max_instances=most)
+    for share in (0, .1, .3, .6):
+        eq1.reset(rng.random(len(pool)) < share)
+        members = np.flatnonzero(eq1.mask)
+        assert np.array_equal(eq1.deltas_without(members), deltas_by_flips(eq1, members))
+
+
 def test_the_truth_beats_the_empty_scene_on_depth():
     observation, probabilities, pool = rendered(np.random.default_rng(9))
     truth = energy_of(observation, probabilities, pool.take(np.arange(12, 17)), MODELS)

@@ -81,6 +81,14 @@ def test_deltas_are_what_flips_change(setting):
         np.testing.assert_array_equal(setting.energy.mask, mask)
 
 
+def test_deltas_without_a_member_equal_those_after_its_flip(setting, deltas_by_flips):
+    for mask in setting.subsets:
+        setting.energy.reset(mask)
+        members = np.flatnonzero(mask)
+        assert np.array_equal(setting.energy.deltas_without(members),
+                              deltas_by_flips(setting.energy, members))
+
+
 def test_nothing_chosen_costs_the_foreground(setting, desk):
     none = np.zeros(len(setting.pool), bool)
     foreground = sum(v.foreground.sum() for v in desk.observation.views)

@@ -2,8 +2,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Greedy and iterated local search against brute force on composited energies."""
 
-import sys
-
 from hooc_perception.core.energy import local_search as module
 from hooc_perception.core.energy.compositor import Compositor
 from hooc_perception.core.energy.local_search import (
@@ -71,27 +69,44 @@ def test_greedy_ends_where_no_flip_helps_and_descend_where_no_swap_does():
 
 
 @pytest.mark.parametrize('seed', range(5))
-def test_known_optima_save_flips_and_change_nothing(seed, monkeypatch):
-    class Counting(Compositor):
-        flips = 0
+def test_known_optima_save_swaps_and_change_nothing(seed, monkeypatch):
+    tried = []
 
-        def flip(self, k):
-            Counting.flips += 1
-            super().flip(k)
+    def counting(energy):
+        tried.append(energy)
+        return best_swap(energy)
 
-    monkeypatch.setattr(sys.modules[__name__], 'Compositor', Counting)
-    found, flips = [], []
+    monkeypatch.setattr(module, 'best_swap', counting)
+    found, swaps = [], []
     for forget in (False, True):
         if forget:
             def forgetting(energy, config, stop, optima):
                 descend(energy, config, stop)
             monkeypatch.setattr(module, 'descend', forgetting)
-        Counting.flips = 0
+        tried.clear()
         found.append(local_search(instance(seed, n=40), np.random.default_rng(1)))
-        flips.append(Counting.flips)
+        swaps.append(len(tried))
     assert np.array_equal(found[0].mask, found[1].mask)
     assert found[0].energy == found[1].energy
-    assert flips[0] < flips[1]
+    assert swaps[0] < swaps[1]
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_the_best_swap_is_the_best_of_all(seed):
+    energy = instance(seed, n=30, group=np.arange(30) % 11, max_per_group=1)
+    greedy(energy)
+    here, value = energy.mask, energy.value
+    swapped = []
+    for a in np.flatnonzero(here):
+        for b in np.flatnonzero(~here):
+            other = here.copy()
+            other[[a, b]] = False, True
+            if np.bincount(np.flatnonzero(other) % 11).max() <= 1:
+                swapped.append((energy.evaluate(other), other))
+    lowest, best = min(swapped, key=lambda pair: pair[0])
+    assert best_swap(energy) == (lowest < value - module.TINY)
+    assert energy.value == min(lowest, value)
+    assert np.array_equal(energy.mask, best if lowest < value - module.TINY else here)
 
 
 def test_a_swap_that_does_not_help_leaves_everything_alone():

@@ -117,6 +117,18 @@ def test_every_flip_of_a_walk_agrees_with_the_whole():
     assert np.array_equal(term.mask, mask)
 
 
+def test_deltas_without_a_member_equal_those_after_its_flip(deltas_by_flips):
+    rng = np.random.default_rng(8)
+    term = OverlapTerm(placed(*[
+        (c, rng.uniform(-.05, .05, 3), rng.normal(size=3), MODELS[c - 1].extents)
+        for c in (1, 2, 3) * 5]), MODELS)
+    for share in (0.1, 0.4, 0.8):
+        term.reset(rng.random(15) < share)
+        members, others = np.flatnonzero(term.mask), ~term.mask
+        assert np.array_equal(term.deltas_without(members)[:, others],
+                              deltas_by_flips(term, members)[:, others])
+
+
 def test_what_was_compared_before_does_not_matter():
     rng = np.random.default_rng(7)
     n = 90

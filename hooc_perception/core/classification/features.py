@@ -169,8 +169,8 @@ def _segments(mean: Float64Array, normal: Float64Array, pairs: Int32Array, weigh
               cell: float) -> features.Segments:
     """Return the convex segments of a voxel graph at all SEGMENT_SCALES, with their shapes."""
     order = np.argsort(weight, kind='stable')
-    ids = np.stack([segments.segment(len(mean), pairs, weight, order, k, SMALLEST_SEGMENT)
-                    for k in SEGMENT_SCALES])
+    ids = segments.segment_at(np.array(SEGMENT_SCALES), len(mean), pairs, weight, order,
+                              SMALLEST_SEGMENT)
     most = int(ids.max()) + 1
     frames = np.zeros((len(ids), most, segments.FRAME_COLUMNS))
     shapes = np.zeros((len(ids), most, segments.SEGMENT_FEATURES), np.float32)

@@ -9,7 +9,6 @@ from hooc_perception.core.arrays import (
     AnyArray,
     Float32Array,
     Int32Array,
-    Int64Array,
     UInt8Array,
 )
 from hooc_perception.core.classification.kernels import walk
@@ -99,22 +98,10 @@ class Forest:
         rows = self.feature, self.threshold, self.left, self.leaf
         if any(row.shape != (n,) for row in rows) or self.roots.ndim != 1:
             return False
-        inner = self.feature >= 0
-        children = self.left[inner]
         return (self.leaf_p.ndim == 2 and len(self.roots) > 0
-                and _within(self.roots, n) and _within(self.leaf[~inner], len(self.leaf_p))
-                and bool((children > np.nonzero(inner)[0]).all()) and _within(children + 1, n))
-
-
-def _within(index: Int32Array | Int64Array, size: int) -> bool:
-    """Return whether every entry of an integer array lies in [0, size)."""
-    return bool(((index >= 0) & (index < size)).all())
+                and walk.is_sound(self.nodes, self.roots, self.leaf, len(self.leaf_p)))
 
 
 def quantised(p: ArrayLike) -> UInt8Array:
     """Return uint8 rows of probabilities (n, C) x 255, rounded so that each row sums to 255."""
-    scaled = np.asarray(p, np.float64) * 255 / np.maximum(np.sum(p, 1, keepdims=True), 1e-12)
-    low = np.floor(scaled)
-    short = (255 - low.sum(1)).round().astype(int)
-    rank = np.argsort(np.argsort(low - scaled, axis=1, kind='stable'), axis=1, kind='stable')
-    return (low + (rank < short[:, None])).astype(np.uint8)
+    return walk.quantise_rows(np.ascontiguousarray(p, np.float64))

@@ -9,6 +9,7 @@ and the depth of the empty scene (foreground.py). Rectification itself comes bef
 """
 
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 from hooc_perception.core.arrays import Float64Array
@@ -18,7 +19,7 @@ from hooc_perception.core.segment.foreground import against_table, Allowed
 from hooc_perception.core.segment.level import LEAST_SIGMA_M, level, MOST_SIGMA_M
 from hooc_perception.core.segment.regions import workspace_of
 from hooc_perception.core.segment.table import in_table_frame, radius_m
-from hooc_perception.core.types import Observation, RectifiedView
+from hooc_perception.core.types import Camera, Observation, ObservedView, RectifiedView
 from hooc_perception.errors import HoocError
 import numpy as np
 
@@ -50,15 +51,22 @@ def observe(views: Sequence[RectifiedView], config: ObserveConfig = ObserveConfi
     views, reach_m = in_table_frame(views, T_target_table), radius_m(config)
     troubles = table_troubles(views, config.table_band_m, reach_m)
     allowed = Allowed(workspace_of(config.workspace, config.ignore), T_target_table, reach_m)
-    fits = [level(view, config, reach_m) for view in views]
-    known = [sigma for _, sigma in fits if np.isfinite(sigma)]
-    noise_m = (float(np.clip(np.median(known), LEAST_SIGMA_M, MOST_SIGMA_M)) if known
-               else DEFAULT_NOISE_M)
-    return Observation(
-        tuple(replace(against_table(camera, view.depth, sigma if np.isfinite(sigma) else noise_m,
-                                    config, allowed), hidden=view.hidden)
-              for view, (camera, sigma) in zip(views, fits)), noise_m, T_target_table,
-        tuple(f'camera {name}: {trouble}' for name, trouble in troubles.items()))
+    # numpy and scipy compute without the interpreter's lock: the views share the cores.
+    with ThreadPoolExecutor(len(views)) as threads:
+        fits = list(threads.map(lambda view: level(view, config, reach_m), views))
+        known = [sigma for _, sigma in fits if np.isfinite(sigma)]
+        noise_m = (float(np.clip(np.median(known), LEAST_SIGMA_M, MOST_SIGMA_M)) if known
+                   else DEFAULT_NOISE_M)
+
+        def segmented(view: RectifiedView, fit: tuple[Camera, float]) -> ObservedView:
+            camera, sigma = fit
+            seen = against_table(camera, view.depth, sigma if np.isfinite(sigma) else noise_m,
+                                 config, allowed)
+            return replace(seen, hidden=view.hidden)
+
+        observed = tuple(threads.map(segmented, views, fits))
+    return Observation(observed, noise_m, T_target_table, tuple(
+        f'camera {name}: {trouble}' for name, trouble in troubles.items()))
 
 
 def require_table(observation: Observation) -> Observation:

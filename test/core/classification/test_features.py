@@ -130,6 +130,38 @@ def test_thinned_pixels_take_a_neighbour_of_their_own_surface(scene):
     assert (everyone[same] == np.arange(len(donor))).all()
 
 
+def spread_edge_by_edge(p, voxel, n_voxels, pairs, weight, steps):
+    """Return what `smoothing.spread` does, in plain Python."""
+    own, count = np.zeros((n_voxels, p.shape[1])), np.bincount(voxel, minlength=n_voxels)
+    np.add.at(own, voxel, p)
+    own /= np.maximum(count, 1)[:, None]
+    now, known = own.copy(), count > 0
+    for _ in range(steps):
+        new, total = own.copy(), (count > 0).astype(float)
+        for (a, b), w in zip(pairs, weight):
+            for here, there in ((a, b), (b, a)):
+                new[here] += known[there] * w * now[there]
+                total[here] += known[there] * w
+        reached = total > 1e-6
+        now[reached] = new[reached] / total[reached, None]
+        known = known | reached
+    now[~known, 0] = 1
+    return now
+
+
+def test_probabilities_spread_as_edge_by_edge():
+    rng = np.random.default_rng(2)
+    n = 60
+    pairs = np.array([(a, b) for a in range(n - 10) for b in range(a + 1, min(a + 4, n - 10))])
+    weight = rng.choice([0.0, 0.3, 1.0], len(pairs)).astype(np.float32)
+    voxel = rng.integers(0, n // 2, 40)
+    p = rng.dirichlet(np.ones(5), 40).astype(np.float32)
+    for steps in (0, 1, 7):
+        np.testing.assert_allclose(
+            smoothing.spread(p, voxel, n, pairs.astype(np.int32), weight, steps),
+            spread_edge_by_edge(p, voxel, n, pairs, weight, steps), atol=1e-5)
+
+
 def test_probabilities_spread_along_edges_and_stop_at_cuts():
     pairs = np.array([[0, 1], [1, 2], [2, 3]], np.int32)
     weight = np.array([1.0, 1.0, 0.0], np.float32)

@@ -194,6 +194,16 @@ def segment(n: int, pairs: Int32Array, weight: Float32Array, order: Int64Array, 
     return out
 
 
+@nb.njit(cache=True, parallel=True)
+def segment_at(scales: Float64Array, n: int, pairs: Int32Array, weight: Float32Array,
+               order: Int64Array, smallest: int) -> Int32Array:
+    """Return (len(scales), n) int32: what `segment` returns for each k of `scales`."""
+    ids = np.empty((scales.shape[0], n), np.int32)
+    for i in nb.prange(scales.shape[0]):
+        ids[i] = segment(n, pairs, weight, order, scales[i], smallest)
+    return ids
+
+
 @nb.njit(cache=True)
 def _spread(values: Float64Array, low: float, high: float) -> tuple[float, float]:
     """Return (low, high) quantiles of a non-empty array."""
@@ -347,7 +357,7 @@ def _describe_one(members: Int64Array, mean: Float64Array, normal: Float64Array,
     _describe_normals(normal, members, f)
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, parallel=True)
 def describe(ids: Int32Array, n_segments: int, mean: Float64Array, normal: Float64Array,
              cell: float) -> tuple[Float64Array, Float32Array]:
     """
@@ -359,6 +369,6 @@ def describe(ids: Int32Array, n_segments: int, mean: Float64Array, normal: Float
     frames = np.zeros((n_segments, FRAME_COLUMNS))
     out = np.zeros((n_segments, SEGMENT_FEATURES), np.float32)
     order, start = _members(ids, n_segments)
-    for s in range(n_segments):
+    for s in nb.prange(n_segments):
         _describe_one(order[start[s]:start[s + 1]], mean, normal, cell, frames[s], out[s])
     return frames, out

@@ -11,6 +11,7 @@ from hooc_perception.core.arrays import (
     UInt8Array,
     UInt16Array,
 )
+from hooc_perception.core.classification.kernels.graph import neighbours
 import numba as nb
 import numpy as np
 
@@ -69,7 +70,7 @@ def thin(camera: UInt8Array, uv: UInt16Array, points: Float64Array,
     return rows[:k], donor
 
 
-@nb.njit(cache=True)
+@nb.njit(cache=True, parallel=True)
 def spread(p: Float32Array, voxel: AnyArray, n_voxels: int, pairs: Int32Array,
            weight: Float32Array, steps: int) -> Float32Array:
     """
@@ -90,27 +91,26 @@ def spread(p: Float32Array, voxel: AnyArray, n_voxels: int, pairs: Int32Array,
     for v in range(n_voxels):
         if count[v] > 0:
             own[v] /= count[v]
+    start, other, w = neighbours(n_voxels, pairs, weight)
     now, known = own.copy(), count > 0
-    new, total = np.empty_like(own), np.empty(n_voxels, np.float32)
+    new, reached = np.empty_like(own), np.empty_like(known)
     for _ in range(steps):
-        for v in range(n_voxels):
-            new[v] = own[v]
-            total[v] = 1.0 if count[v] > 0 else 0.0
-        for e in range(pairs.shape[0]):
-            a, b, w = pairs[e, 0], pairs[e, 1], weight[e]
-            if known[b]:
-                for c in range(n_classes):
-                    new[a, c] += w * now[b, c]
-                total[a] += w
-            if known[a]:
-                for c in range(n_classes):
-                    new[b, c] += w * now[a, c]
-                total[b] += w
-        for v in range(n_voxels):
-            if total[v] > 1e-6:
-                known[v] = True
-                for c in range(n_classes):
-                    now[v, c] = new[v, c] / total[v]
+        for v in nb.prange(n_voxels):
+            sums = np.empty(n_classes, np.float32)
+            total = np.float32(1.0 if count[v] > 0 else 0.0)
+            for c in range(n_classes):
+                sums[c] = own[v, c]
+            for k in range(start[v], start[v + 1]):
+                u, share = other[k], w[k]
+                if known[u]:
+                    total += share
+                    for c in range(n_classes):
+                        sums[c] += share * now[u, c]
+            reached[v] = known[v] or total > 1e-6
+            for c in range(n_classes):
+                new[v, c] = sums[c] / total if total > 1e-6 else now[v, c]
+        now, new = new, now
+        known, reached = reached, known
     for v in range(n_voxels):
         if not known[v]:
             now[v, 0] = 1.0

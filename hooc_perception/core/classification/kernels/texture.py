@@ -9,6 +9,7 @@ from hooc_perception.core.arrays import (
     Int32Array,
     Int64Array,
 )
+from hooc_perception.core.classification.kernels.graph import neighbours
 from hooc_perception.core.kernels.linalg import eigen_jacobi
 import numba as nb
 import numpy as np
@@ -20,27 +21,6 @@ SHAPES, MEASURES = 4, 7
 TEXTURE_FEATURES = MEASURES * len(REACHES)
 # What is averaged: second moment of the normals (6), then valley, ridge and curvature.
 MOMENTS, VALLEY, RIDGE, CURVATURE, RAW = 6, 6, 7, 8, 9
-
-
-@nb.njit(cache=True)
-def _neighbours(m: int, pairs: Int32Array, weight: Float64Array
-                ) -> tuple[Int64Array, Int32Array, Float32Array]:
-    """Return (start (m + 1,), other, w): the graph as neighbour lists, in the edges' order."""
-    start = np.zeros(m + 1, np.int64)
-    for e in range(pairs.shape[0]):
-        start[pairs[e, 0] + 1] += 1
-        start[pairs[e, 1] + 1] += 1
-    start = np.cumsum(start)
-    fill = start[:-1].copy()
-    other = np.empty(2 * pairs.shape[0], np.int32)
-    w = np.empty(2 * pairs.shape[0], np.float32)
-    for e in range(pairs.shape[0]):
-        a, b = pairs[e, 0], pairs[e, 1]
-        other[fill[a]], w[fill[a]] = b, weight[e]
-        other[fill[b]], w[fill[b]] = a, weight[e]
-        fill[a] += 1
-        fill[b] += 1
-    return start, other, w
 
 
 @nb.njit(cache=True, parallel=True)
@@ -133,7 +113,7 @@ def textures(points: Float64Array, normals: Float64Array, pairs: Int32Array,
     :param points: (m, 3) and normals (m, 3); pairs (e, 2), weight (e,) in [0, 1].
     """
     out = np.empty((points.shape[0], TEXTURE_FEATURES), np.float32)
-    start, other, w = _neighbours(points.shape[0], pairs, weight)
+    start, other, w = neighbours(points.shape[0], pairs, weight)
     now, done = _raw(points, normals, pairs).astype(np.float32), 0
     for r in range(len(REACHES)):
         now = _diffuse(now, start, other, w, REACHES[r] - done)

@@ -4,7 +4,7 @@
 
 from typing import NamedTuple
 
-from hooc_perception.core.arrays import Float32Array, Int32Array, UInt8Array
+from hooc_perception.core.arrays import Float32Array, Float64Array, Int32Array, UInt8Array
 import numba as nb
 import numpy as np
 
@@ -93,4 +93,45 @@ def predict(x: Float32Array, nodes: Nodes, roots: Int32Array, leaves: Leaves) ->
             walk_tree(x[lo:hi], nodes, roots[t], end)
             add_leaves(end, leaves, out[lo:hi])
         normalize(out[lo:hi])
+    return out
+
+
+@nb.njit(cache=True)
+def is_sound(nodes: Nodes, roots: Int32Array, leaf: Int32Array, n_leaves: int) -> bool:
+    """Return whether all roots, children (behind their node) and leaves are where they can be."""
+    n = nodes.feature.shape[0]
+    for root in roots:
+        if root < 0 or root >= n:
+            return False
+    for i in range(n):
+        if nodes.feature[i] >= 0:
+            if nodes.left[i] <= i or nodes.left[i] >= n - 1:
+                return False
+        elif leaf[i] < 0 or leaf[i] >= n_leaves:
+            return False
+    return True
+
+
+@nb.njit(cache=True, parallel=True)
+def quantise_rows(p: Float64Array) -> UInt8Array:
+    """Return uint8 rows of probabilities (n, C) x 255; what rounding loses goes to the nearest."""
+    n, n_classes = p.shape
+    out = np.empty((n, n_classes), np.uint8)
+    for i in nb.prange(n):
+        total = 0.0
+        for c in range(n_classes):
+            total += p[i, c]
+        lost, left = np.empty(n_classes), 255
+        for c in range(n_classes):
+            scaled = p[i, c] * 255.0 / max(total, 1e-12)
+            whole = int(np.floor(scaled))
+            out[i, c] = whole
+            left -= whole
+            lost[c] = scaled - whole
+        for _ in range(left):
+            most = np.argmax(lost)
+            if lost[most] < 0.0:
+                break
+            out[i, most] += 1
+            lost[most] = -1.0
     return out

@@ -19,6 +19,8 @@ MAX_GROUP = 240
 # Two sides are as good as equally scaled where they differ by less than this share: a turn
 # then moves no surface by more than half of it times the radius.
 SAME_SCALE = 0.1
+# An estimate is the wrong way round if half a turn brings it this close to the truth.
+HALF_TURN_SLACK_RAD = np.pi / 6
 # A trace (1 + 2 cos) has to grow by more for a turn to count: a microradian, which is more than
 # what handing a rotation on as a quaternion does to it.
 MARGIN = 1e-12
@@ -118,6 +120,23 @@ def rotation_error(R_est: Float64Array, R_true: Float64Array,
     relative = np.einsum('ji,njk->nik', R_est, R_true @ symmetry_rotations(symmetry))
     trace = np.trace(relative, axis1=1, axis2=2)
     return float(np.arccos(np.clip((trace.max() - 1) / 2, -1.0, 1.0)))
+
+
+def is_half_turned(R_est: Float64Array, R_true: Float64Array,
+                   symmetry: Sequence[int] | np.ndarray = (1, 1, 1)) -> bool:
+    """
+    Return whether an estimate lies the wrong way round: end for end, or upside down.
+
+    It is off by more than a right angle, and half a turn about one axis of the model brings it
+    within HALF_TURN_SLACK_RAD of the truth.
+
+    :param R_est: (3, 3) model to world, as `R_true`.
+    :param symmetry: (3,) as in GenericModel.symmetry; what looks the same is not turned.
+    """
+    if rotation_error(R_est, R_true, symmetry) <= np.pi / 2:
+        return False
+    return any(rotation_error(R_est @ _about(axis, [np.pi])[0], R_true, symmetry)
+               < HALF_TURN_SLACK_RAD for axis in range(3))
 
 
 def half_turns(objects: Candidates, models: Sequence[GenericModel],

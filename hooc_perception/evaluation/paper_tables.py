@@ -164,16 +164,18 @@ def strict_table(evaluations: Sequence[Evaluation]) -> Table | None:
             f'{np.median([o.centre_m for o in placed]) * 1000:.0f}' if placed else None,
             f'{np.median(degrees):.0f}' if placed else None,
             float(sum(degrees < 15) / len(objects)) if objects else None,
+            float(np.mean([o.half_turned for o in placed])) if placed else None,
             float(np.median(errors['size_ratio'])) if len(errors['size_ratio']) else None, *bop))
     if not rows:
         return None
-    header = ('results', 'localized', '< 2 cm', 'mm', 'deg', '< 15 deg', 'size', 'AR VSD',
-              'AR MSSD', 'AR MSPD', 'AR')
+    header = ('results', 'localized', '< 2 cm', 'mm', 'deg', '< 15 deg', 'turned', 'size',
+              'AR VSD', 'AR MSSD', 'AR MSPD', 'AR')
     return Table('Stricter scores', header, tuple(rows),
                  ('mm, deg: median errors of the localized objects, rotation up to the '
                   "model's symmetry; < 15 deg: share of all true objects that are localized with "
-                  'a rotation error below 15 degrees; size: median ratio of estimated to true '
-                  'size; AR: BOP average recall.',))
+                  'a rotation error below 15 degrees; turned: share of the localized objects '
+                  'that lie the wrong way round, end for end or upside down; size: median ratio '
+                  'of estimated to true size; AR: BOP average recall.',))
 
 
 def category_table(evaluation: Evaluation, categories: Iterable[str]) -> Table:
@@ -184,10 +186,10 @@ def category_table(evaluation: Evaluation, categories: Iterable[str]) -> Table:
             rows.append((name, c['true'], c['estimated'], c['found'], c['localized'], c['tight'],
                          None if c['centre_m'] is None else f'{c["centre_m"] * 1000:.0f}',
                          None if c['rotation_rad'] is None
-                         else f'{np.degrees(c["rotation_rad"]):.0f}'))
+                         else f'{np.degrees(c["rotation_rad"]):.0f}', c['half_turned']))
     label = f': {evaluation.label}' if evaluation.label else ''
     return Table(f'Per category{label}', ('category', 'true', 'estimated', 'found', 'local',
-                                          '< 2 cm', 'mm', 'deg'), tuple(rows))
+                                          '< 2 cm', 'mm', 'deg', 'turned'), tuple(rows))
 
 
 def mask_table(evaluation: Evaluation) -> Table | None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from hooc_perception.core.arrays import Float64Array
 from hooc_perception.core.geometry import matrix_from_pose
-from hooc_perception.core.symmetry import rotation_error
+from hooc_perception.core.symmetry import is_half_turned, rotation_error
 from hooc_perception.core.types import GenericModel
 from hooc_perception.evaluation.matching import match_by_centre, PosedObject
 import numpy as np
@@ -26,6 +26,7 @@ class ObjectScore:
     :ivar centre_m: distance between the centres; NaN without an estimate, as the next.
     :ivar rotation_rad: least angle over the model's symmetries.
     :ivar size_ratio: estimated over true length of the bounding box's diagonal.
+    :ivar half_turned: whether it lies the wrong way round, see `is_half_turned`.
     """
 
     category: str
@@ -35,6 +36,7 @@ class ObjectScore:
     centre_m: float = float('nan')
     rotation_rad: float = float('nan')
     size_ratio: float = float('nan')
+    half_turned: bool = False
 
     @property
     def tight(self) -> bool:
@@ -87,7 +89,8 @@ def score_objects(estimates: Sequence[PosedObject], truths: Sequence[PosedObject
         out.append(ObjectScore(
             truth.category, index, i_est, metres < 0.5 * model.longest_side, metres,
             rotation_error(R_est, R_true, model.symmetry),
-            float(np.linalg.norm(estimate.size) / np.linalg.norm(truth.size))))
+            float(np.linalg.norm(estimate.size) / np.linalg.norm(truth.size)),
+            is_half_turned(R_est, R_true, model.symmetry)))
     return out
 
 
@@ -131,8 +134,8 @@ def per_category(scores: Sequence[SceneScore],
     """
     Return {category: dict} of counts and median errors.
 
-    The counts are true, estimated, found, localized, tight; centre_m and rotation_rad are
-    medians over the localized objects, None where there are none.
+    The counts are true, estimated, found, localized, tight, and half_turned among the localized;
+    centre_m and rotation_rad are medians over the localized objects, None where there are none.
 
     :param estimates_by_scene: in the order of `scores`.
     """
@@ -145,6 +148,7 @@ def per_category(scores: Sequence[SceneScore],
             'estimated': sum(e.category == category for es in estimates_by_scene for e in es),
             'found': sum(o.estimate is not None for o in objects),
             'localized': len(placed), 'tight': sum(o.tight for o in objects),
+            'half_turned': sum(o.half_turned for o in placed),
             'centre_m': float(np.median([o.centre_m for o in placed])) if placed else None,
             'rotation_rad': (float(np.median([o.rotation_rad for o in placed]))
                              if placed else None)}

@@ -2,7 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables over all rows of a set, from the JSON files of `hooc evaluate` and `hooc stages`."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from hooc_perception.evaluation import named_masks, paper, shape_table
@@ -58,22 +58,22 @@ def score_table(scores: dict[str, Scores], seconds: Mapping[str, float | None]) 
             bold.append(len(rows))
             rows.append((HOOC, setting, *(_three(paper.mean(setting, c))
                                           for c in ('found', 'localized')), None, None,
-                         f'{paper.mean(setting, "false_categories"):.1f}', *(None,) * 7))
+                         f'{paper.mean(setting, "false_categories"):.1f}', *(None,) * 8))
         for row, content in scores.items():
             result = of_setting(content, setting)
             if result is not None:
                 rows.append((f'`{row}`', called, *_score_cells(result),
                              _whole(seconds[row]) if setting == 'A' else None))
     return Table('Found and localized',
-                 ('', 'setting', 'found', 'localized', '< 2 cm', '< 15 deg', 'false', 'mm', 'deg',
-                  'AR VSD', 'AR MSSD', 'AR MSPD', 'AR', 'CPU s'), tuple(rows),
+                 ('', 'setting', 'found', 'localized', '< 2 cm', '< 15 deg', 'turned', 'false',
+                  'mm', 'deg', 'AR VSD', 'AR MSSD', 'AR MSPD', 'AR', 'CPU s'), tuple(rows),
                  ('Means over scenes. Setting A: the full chain; B: the true poses are among the '
                   'candidates; no verifier: with `parse.verify_weight=0`. < 15 deg: share of the '
                   'true objects that are localized with a rotation error below 15 degrees, up to '
-                  'symmetry; false: false categories per '
-                  "scene; mm, deg: median errors of the localized objects; AR: BOP's average "
-                  'recalls; CPU s: processor seconds per scene, including start-up and the '
-                  'loading of compiled code.',),
+                  'symmetry; turned: share of the localized that lie the wrong way round; false: '
+                  "false categories per scene; mm, deg: median errors of the localized objects; "
+                  "AR: BOP's average recalls; CPU s: processor seconds per scene, including "
+                  'start-up and the loading of compiled code.',),
                  tuple(bold))
 
 
@@ -83,10 +83,18 @@ def _score_cells(result: dict[str, Any]) -> tuple[Cell, ...]:
     placed = [o for s in result['scenes'] for o in s['objects'] if o['localized']]
     degrees = np.degrees([o['rotation_rad'] for o in placed])
     return (*(_three(mean[c]) for c in ('found', 'localized', 'tight')),
-            _three(ablations.turned_right(result)), f'{mean["false_categories"]:.1f}',
+            _three(ablations.turned_right(result)), _turned(placed),
+            f'{mean["false_categories"]:.1f}',
             f'{1000 * np.median([o["centre_m"] for o in placed]):.0f}' if placed else None,
             f'{np.median(degrees):.0f}' if placed else None,
             *(bop.get(key) for key in ('vsd', 'mssd', 'mspd', 'average')))
+
+
+def _turned(placed: Sequence[dict[str, Any]]) -> str | None:
+    """Return the share of localized objects that lie the wrong way round, if it was counted."""
+    if not placed or any('half_turned' not in o for o in placed):
+        return None
+    return _three(float(np.mean([o['half_turned'] for o in placed])))
 
 
 def certain_table(scores: dict[str, Scores]) -> Table:

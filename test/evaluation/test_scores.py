@@ -120,7 +120,7 @@ def test_per_category_counts(tiny, models, truth_results):
     truth_results['scenes'][0]['objects'].pop(0)
     table = evaluate_results(tiny, truth_results, models).per_category(tiny.category_names)
     assert table['ball'] == {'true': 1, 'estimated': 0, 'found': 0, 'localized': 0, 'tight': 0,
-                             'centre_m': None, 'rotation_rad': None}
+                             'half_turned': 0, 'centre_m': None, 'rotation_rad': None}
     assert (table['box']['true'], table['box']['tight'], table['can']['estimated']) == (2, 2, 2)
 
 

@@ -104,4 +104,5 @@ class Forest:
 
 def quantised(p: ArrayLike) -> UInt8Array:
     """Return uint8 rows of probabilities (n, C) x 255, rounded so that each row sums to 255."""
-    return walk.quantise_rows(np.ascontiguousarray(p, np.float64))
+    return walk.quantise_rows(np.ascontiguousarray(p, np.float64),
+                              np.sum(p, 1).astype(np.float64))

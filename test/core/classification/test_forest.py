@@ -90,7 +90,7 @@ def test_missing_arrays_are_named(forest):
 
 def quantised_in_numpy(p):
     """Return what `quantised` does, whole columns at a time."""
-    scaled = p * 255 / np.maximum(p.sum(1, keepdims=True), 1e-12)
+    scaled = np.asarray(p, float) * 255 / np.maximum(p.sum(1, keepdims=True), 1e-12)
     low = np.floor(scaled)
     short = (255 - low.sum(1)).round().astype(int)
     rank = np.argsort(np.argsort(low - scaled, axis=1, kind='stable'), axis=1, kind='stable')
@@ -101,7 +101,8 @@ def test_quantised_rows_are_those_of_numpy():
     rng = np.random.default_rng(1)
     p = np.concatenate([rng.dirichlet(np.full(26, 0.2), 500), rng.integers(0, 4, (300, 26)),
                         np.zeros((1, 26)), np.eye(26)])
-    assert np.array_equal(quantised(p), quantised_in_numpy(p.astype(float)))
+    for dtype in (np.float32, np.float64):
+        assert np.array_equal(quantised(p.astype(dtype)), quantised_in_numpy(p.astype(dtype)))
 
 
 def test_quantised_rows_sum_to_255_and_stay_near():

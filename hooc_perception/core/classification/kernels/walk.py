@@ -113,17 +113,18 @@ def is_sound(nodes: Nodes, roots: Int32Array, leaf: Int32Array, n_leaves: int) -
 
 
 @nb.njit(cache=True, parallel=True)
-def quantise_rows(p: Float64Array) -> UInt8Array:
-    """Return uint8 rows of probabilities (n, C) x 255; what rounding loses goes to the nearest."""
+def quantise_rows(p: Float64Array, totals: Float64Array) -> UInt8Array:
+    """
+    Return uint8 rows of probabilities (n, C) x 255; what rounding loses goes to the nearest.
+
+    :param totals: (n,) the sum of each row.
+    """
     n, n_classes = p.shape
     out = np.empty((n, n_classes), np.uint8)
     for i in nb.prange(n):
-        total = 0.0
-        for c in range(n_classes):
-            total += p[i, c]
         lost, left = np.empty(n_classes), 255
         for c in range(n_classes):
-            scaled = p[i, c] * 255.0 / max(total, 1e-12)
+            scaled = p[i, c] * 255.0 / max(totals[i], 1e-12)
             whole = int(np.floor(scaled))
             out[i, c] = whole
             left -= whole

@@ -41,7 +41,8 @@ demo: setup
 	@$(HOOC) demo
 
 test: setup
-	@.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile $(PYTEST_ARGS)
+	@.venv/bin/python -m pytest -n auto --maxprocesses 4 --dist loadfile \
+	  --no-loadscope-reorder $(PYTEST_ARGS)
 
 results: setup
 	@.venv/bin/python -m hooc_perception.experiments --out $(RESULTS) \

@@ -11,6 +11,13 @@ import pytest
 REPOSITORY = Path(__file__).resolve().parent.parent
 
 
+def pytest_collection_modifyitems(items):
+    """Put the files with slow tests first: where files run side by side, none is waited for."""
+    slow = {item.path for item in items
+            if any(item.get_closest_marker(name) for name in ('slow', 'colcon'))}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 @pytest.fixture(scope='session')
 def repository():
     """Return the root of the source tree."""

@@ -209,8 +209,12 @@ def test_every_change_of_a_table_is_answered_and_ids_stay(repository, unset):
     table = ChangingTable(folder.models, folder.cameras, np.random.default_rng(3))
     parameters = {name: {'model': str(model), 'profile': 'fast'} for name in CHAIN}
     parameters[PARSING].update(max_instances=2, full_every_s=5.0)
-    result = soak(table, parameters, 60.0)
-    changes = result.changes
+    # A machine that does other work meanwhile may need longer for the second change.
+    for seconds in (60.0, 240.0):
+        result = soak(table, parameters, seconds)
+        changes = result.changes
+        if result.deaths or len(changes.followed) >= 2:
+            break
     assert result.deaths == 0 and len(changes.followed) >= 2
     # The last change may have come just before the end.
     assert not changes.lost and all(f.answers for f in changes.followed[:-1]), changes

@@ -88,37 +88,49 @@ def add(k: int, lists: Lists, runs: Runs, active: BoolArray, first: Int32Array,
 
 
 @nb.njit(cache=True)
+def _take_off(p: int, s: int, runs: Runs, active: BoolArray, first: Int32Array,
+              second: Int32Array, deltas: Float64Array) -> int:
+    """
+    Bring `deltas` to where slot s of pixel p, the first or second active one, is off.
+
+    :return: the slot that is the second active one then.
+    """
+    owner, slot_cost, start = runs
+    t, u, end = first[p], second[p], start[p + 1] - 1
+    v = u
+    if u < end:
+        v = u + 1
+        while not active[owner[v]]:
+            v += 1
+    if s == u:
+        deltas[owner[t]] += slot_cost[v] - slot_cost[u]
+        return v
+    old, new = slot_cost[t], slot_cost[u]
+    for q in range(start[p], t):
+        deltas[owner[q]] += old - new
+    deltas[owner[t]] -= 2.0 * (new - old)
+    for q in range(t + 1, u):
+        deltas[owner[q]] += slot_cost[q] - new
+    if u < end:
+        deltas[owner[u]] += slot_cost[v] - new
+    return v
+
+
+@nb.njit(cache=True)
 def remove(k: int, lists: Lists, runs: Runs, active: BoolArray, first: Int32Array,
            second: Int32Array, deltas: Float64Array) -> None:
     """Switch candidate k off and update first, second and the deltas of all that share pixels."""
-    (offsets, pixel, slot), (owner, slot_cost, start) = lists, runs
+    offsets, pixel, slot = lists
     active[k] = False
     for e in range(offsets[k], offsets[k + 1]):
         p, s = pixel[e], slot[e]
-        t = first[p]
-        if s < t or s > second[p]:
+        t, u = first[p], second[p]
+        if s != t and s != u:
             continue
-        end = start[p + 1] - 1
-        u = second[p]
-        v = u
-        if u < end:
-            v = u + 1
-            while not active[owner[v]]:
-                v += 1
+        v = _take_off(p, s, runs, active, first, second, deltas)
         if s == t:
-            old, new = slot_cost[t], slot_cost[u]
-            for q in range(start[p], t):
-                deltas[owner[q]] += old - new
-            deltas[k] -= 2.0 * (new - old)
-            for q in range(t + 1, u):
-                deltas[owner[q]] += slot_cost[q] - new
-            if u < end:
-                deltas[owner[u]] += slot_cost[v] - new
             first[p] = u
-            second[p] = v
-        elif s == u:
-            deltas[owner[t]] += slot_cost[v] - slot_cost[u]
-            second[p] = v
+        second[p] = v
 
 
 @nb.njit(cache=True, parallel=True)
@@ -131,34 +143,15 @@ def deltas_without(members: Int64Array, lists: Lists, runs: Runs, active: BoolAr
 
     :param members: (m,) int64.
     """
-    (offsets, pixel, slot), (owner, slot_cost, start) = lists, runs
+    offsets, pixel, slot = lists
     out = np.empty((members.shape[0], deltas.shape[0]))
     for i in nb.prange(members.shape[0]):
-        k = members[i]
-        row = out[i]
+        k, row = members[i], out[i]
         row[:] = deltas
         for e in range(offsets[k], offsets[k + 1]):
             p, s = pixel[e], slot[e]
-            t, u = first[p], second[p]
-            if s != t and s != u:
-                continue
-            end = start[p + 1] - 1
-            v = u
-            if u < end:
-                v = u + 1
-                while not active[owner[v]]:
-                    v += 1
-            if s == u:
-                row[owner[t]] += slot_cost[v] - slot_cost[u]
-                continue
-            old, new = slot_cost[t], slot_cost[u]
-            for q in range(start[p], t):
-                row[owner[q]] += old - new
-            row[k] -= 2.0 * (new - old)
-            for q in range(t + 1, u):
-                row[owner[q]] += slot_cost[q] - new
-            if u < end:
-                row[owner[u]] += slot_cost[v] - new
+            if s == first[p] or s == second[p]:
+                _take_off(p, s, runs, active, first, second, row)
     return out
 
 

@@ -76,6 +76,18 @@ def restart(chosen: Int64Array, rows: Int64Array, active: BoolArray, meets: Bool
 
 
 @nb.njit(cache=True)
+def _stale(flipped: int, row: int, chosen: Int64Array, rows: Int64Array,
+           meets: BoolArray) -> BoolArray:
+    """Return (n,) bool: whose delta may change with a flip: it looks at chosen neighbours, too."""
+    stale = meets[row].copy()
+    stale[flipped] = True
+    for c in range(chosen.shape[0]):
+        if meets[row, chosen[c]]:
+            stale |= meets[rows[c]]
+    return stale
+
+
+@nb.njit(cache=True)
 def update(flipped: int, row: int, chosen: Int64Array, rows: Int64Array, active: BoolArray,
            meets: BoolArray, inside: UInt64Array, around: UInt64Array, union: UInt64Array,
            once: UInt64Array, deltas: Int64Array) -> None:
@@ -85,17 +97,10 @@ def update(flipped: int, row: int, chosen: Int64Array, rows: Int64Array, active:
     :param row: of the flipped object in meets, inside and around.
     """
     n = active.shape[0]
-    stale = np.zeros(n, np.bool_)
-    stale[flipped] = True
     for k in range(n):
         if meets[row, k]:
             cover(k, rows, meets, around, union, once)
-            stale[k] = True
-    # The deltas look at chosen neighbours: those of a changed one have changed, too.
-    for c in range(chosen.shape[0]):
-        if meets[row, chosen[c]]:
-            for k in range(n):
-                stale[k] |= meets[rows[c], k]
+    stale = _stale(flipped, row, chosen, rows, meets)
     for k in range(n):
         if stale[k]:
             deltas[k] = flip_delta(k, chosen, rows, active, meets, inside, union, once)
@@ -113,35 +118,22 @@ def deltas_without(members: Int64Array, member_rows: Int64Array, chosen: Int64Ar
     :param members: (m,) int64 chosen objects; `member_rows` (m,) their rows in meets, inside
         and around.
     """
-    n, words = active.shape[0], union.shape[1]
+    n = active.shape[0]
     out = np.empty((members.shape[0], n), np.int64)
     for i in nb.prange(members.shape[0]):
         gone = member_rows[i]
-        out[i] = deltas
-        left = union.copy()
-        stale = np.zeros(n, np.bool_)
+        stay = rows != gone
+        others, their_rows = chosen[stay], rows[stay]
+        left, once = union.copy(), np.empty_like(union)
         for k in range(n):
             if meets[gone, k]:
-                stale[k] = True
-                left[k] = 0
-                for row in rows:
-                    if row != gone and meets[row, k]:
-                        for word in range(words):
-                            left[k, word] |= around[row, k, word]
-        for c in range(chosen.shape[0]):
-            if meets[gone, chosen[c]]:
-                for k in range(n):
-                    stale[k] |= meets[rows[c], k]
+                cover(k, their_rows, meets, around, left, once)
+        stale = _stale(members[i], gone, others, their_rows, meets)
         for k in range(n):
-            if not stale[k] or active[k]:
-                continue
-            total = 0
-            for word in range(words):
-                total += count_bits(left[k, word])
-                for c in range(chosen.shape[0]):
-                    if rows[c] != gone and meets[rows[c], k]:
-                        total += count_bits(inside[rows[c], k, word] & ~left[chosen[c], word])
-            out[i, k] = total
+            out[i, k] = deltas[k]
+            # What is not chosen has no need of `once`.
+            if stale[k] and not active[k]:
+                out[i, k] = flip_delta(k, others, their_rows, active, meets, inside, left, once)
     return out
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from hooc_perception.core.arrays import Float32Array, Float64Array, Int32Array
 from hooc_perception.core.geometry import matrix_from_pose, posed_meshes
 from hooc_perception.core.incremental.memory import Past
-from hooc_perception.core.parsing.unexplained import unexplained_points
+from hooc_perception.core.parsing.unexplained import TOLERANCE_M, Unexplained, unexplained
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Camera, Energy, GenericModel, Observation, ParsedScene
 import numpy as np
@@ -133,9 +133,14 @@ class Scene:
         """
         return render_depth(self.meshes(), camera)
 
-    def unexplained(self, tolerance_m: float = 0.02) -> Float64Array:
+    def unexplained(self, tolerance_m: float = TOLERANCE_M) -> Float64Array:
         """Return (n, 3) measured points above the table that no object explains, world frame."""
-        return unexplained_points(self.observation, self.parsed.objects, self.models, tolerance_m)
+        return self.leftover(tolerance_m).points
+
+    def leftover(self, tolerance_m: float = TOLERANCE_M) -> Unexplained:
+        """Return the same with the reason of each point: noise, residue, or an unknown thing."""
+        return unexplained(self.observation, self.parsed.objects, self.parsed.unknown,
+                           self.models, tolerance_m)
 
 
 def scene_of(parsed: ParsedScene, observation: Observation, models: tuple[GenericModel, ...],

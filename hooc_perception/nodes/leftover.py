@@ -5,9 +5,8 @@
 from collections.abc import Sequence
 from typing import Any
 
-from hooc_perception.core.arrays import Float64Array
-from hooc_perception.core.parsing.unexplained import unexplained_points
-from hooc_perception.core.types import Candidates, GenericModel, Observation
+from hooc_perception.core.parsing.unexplained import Unexplained, unexplained
+from hooc_perception.core.types import Candidates, GenericModel, Observation, UnknownObjects
 import numpy as np
 
 
@@ -21,18 +20,20 @@ class Leftover:
     def __init__(self, models: Sequence[GenericModel]) -> None:
         self._models = models
         # What stood on the table, and what of it the objects left unexplained.
-        self._last: tuple[tuple[Any, ...], Float64Array] | None = None
+        self._last: tuple[tuple[Any, ...], Unexplained] | None = None
 
-    def of(self, observation: Observation, objects: Candidates) -> Float64Array:
+    def of(self, observation: Observation, objects: Candidates,
+           unknown: UnknownObjects) -> Unexplained:
         """
-        Return (n, 3) metres in the target frame, the points that no object explains.
+        Return the points that no object explains, in the target frame.
 
         :param observation: as it came, in the table frame.
-        :param objects: in the target frame.
+        :param objects, unknown: in the target frame.
         """
-        key = observation, objects.translation, objects.rotation_xyzw, objects.size
+        key = (observation, objects.translation, objects.rotation_xyzw, objects.size,
+               unknown.translation, unknown.size)
         if self._last is None or self._last[0][0] is not observation or not all(
                 map(np.array_equal, key[1:], self._last[0][1:])):
-            self._last = key, unexplained_points(observation.in_target_frame(), objects,
-                                                 self._models)
+            self._last = key, unexplained(observation.in_target_frame(), objects, unknown,
+                                          self._models)
         return self._last[1]

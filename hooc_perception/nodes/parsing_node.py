@@ -16,7 +16,7 @@ from hooc_perception.core.geometry import inverse
 from hooc_perception.core.parsing.events import EventLog
 from hooc_perception.core.parsing.hidden_objects import HiddenObjects
 from hooc_perception.core.parsing.tracking import Tracker
-from hooc_perception.core.parsing.unexplained import unexplained_points
+from hooc_perception.core.parsing.unexplained import unexplained
 from hooc_perception.core.types import (
     Candidates,
     GenericModel,
@@ -123,7 +123,7 @@ class Parsing:
         frame = Frame(observation, probabilities, models)
         parsed = self._parser.method.parse(frame, candidates, self._node.config.seed,
                                            self._parser.max_instances)
-        unexplained_points(observation, parsed.objects, models)
+        unexplained(observation, parsed.objects, parsed.unknown, models)
 
     def _parsed(self, observation: Observation, messages: dict[str, Any]) -> ParsedScene:
         """Return the ParsedScene, in the target frame, of what came together for one stamp."""
@@ -157,7 +157,7 @@ class Parsing:
         self._tracker.config = self._hidden.config = node.config
         ids, objects = self._tracker.update(stamp_ns, parsed.objects)
         parsed = replace(parsed, objects=objects)
-        left, found = self._leftover.of(observation, objects), len(ids)
+        left, found = self._leftover.of(observation, objects, parsed.unknown), len(ids)
         parsed, ids = self._hidden.update(stamp_ns, parsed, ids, observation.in_target_frame())
         self._tracker.hold(ids, stamp_ns)
         events = self._log.update(ids, parsed.objects, parsed.hidden_s)

@@ -7,25 +7,20 @@ The foreground that the objects leave is clustered; each cluster that is large e
 thing gets an oriented box on the support plane. A heap may be one cluster.
 """
 
-from hooc_perception.core.arrays import BoolArray, Float64Array, Int64Array
+from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.frame.frame import Frame
-from hooc_perception.core.geometry import matrix_from_pose, posed_meshes, transform
+from hooc_perception.core.geometry import posed_meshes
+from hooc_perception.core.parsing.groups import grouped, near_surfaces
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Candidates, Observation, UnknownObjects
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import ConvexHull, KDTree, QhullError
+from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
 # A pixel is explained where the composed depth of all objects is so near to the measured one.
 TOLERANCE_M = 0.02
 # Of a point of the cloud, the share of pixels that must be open.
 OPEN_SHARE = 0.5
-# What lies so near to the surface of an object is its residue: generic meshes fit no better.
-RESIDUE_M = 0.015
-# Points are thinned to cells of this side, and belong together within this distance.
-CELL_M, REACH_M = 0.008, 0.012
 # A thing has so many cells and this extent; less is noise or the rest of an object.
 FEWEST_CELLS, LONGEST_M, HEIGHT_M = 30, 0.04, 0.012
 # The lowest point of a thing that stands on the table: what is lower is hidden or bent away.
@@ -42,13 +37,10 @@ def find_unknown(frame: Frame, objects: Candidates) -> UnknownObjects:
     if not len(cloud.points):
         return UnknownObjects.empty()
     left = np.flatnonzero(_open(frame, objects))
-    left = left[~_near(cloud.points[left], objects, frame)]
+    left = left[~near_surfaces(cloud.points[left], objects, frame.models)]
     if not len(left):
         return UnknownObjects.empty()
-    cells, member = np.unique(np.floor(cloud.points[left] / CELL_M).astype(np.int64), axis=0,
-                              return_inverse=True)
-    middles = ((cells + 0.5) * CELL_M).astype(np.float64)
-    group = _groups(middles)[member.ravel()]
+    member, group = grouped(cloud.points[left])
     boxes, scores, hulls = [], [], []
     for k in range(group.max() + 1):
         mine = left[group == k]
@@ -79,28 +71,6 @@ def _open(frame: Frame, objects: Candidates) -> BoolArray:
         total += np.bincount(row[seen], minlength=n)
         left += np.bincount(row[seen], weights=unexplained[seen], minlength=n)
     return left > OPEN_SHARE * np.maximum(total, 1)
-
-
-def _near(points: Float64Array, objects: Candidates, frame: Frame) -> BoolArray:
-    """Return (n,) bool: which points lie at the surface of an object."""
-    if not len(objects) or not len(points):
-        return np.zeros(len(points), bool)
-    surfaces = []
-    for i, model in enumerate(objects.shapes(frame.models)):
-        scale = objects.size[i] / np.maximum(model.extents, 1e-9)
-        T = matrix_from_pose(objects.translation[i], objects.rotation_xyzw[i])
-        surfaces.append(transform(T, model.surface_points * scale))
-    return KDTree(np.concatenate(surfaces)).query(
-        points, distance_upper_bound=RESIDUE_M)[0] < np.inf
-
-
-def _groups(points: Float64Array) -> Int64Array:
-    """Return (n,) numbers of the connected groups of points; those above each other are one."""
-    pairs = KDTree(points).query_pairs(REACH_M, output_type='ndarray')
-    above = KDTree(points[:, :2]).query_pairs(0.75 * CELL_M, output_type='ndarray')
-    pairs = np.concatenate([pairs, above])
-    graph = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(points),) * 2)
-    return connected_components(graph, directed=False)[1].astype(np.int64)
 
 
 def _box(points: Float64Array) -> tuple[Float64Array, Float64Array, Float64Array] | None:

@@ -2,19 +2,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """The measured points of a scene, by camera and by what explains them."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from hooc_perception.core.arrays import AnyArray, Float64Array
+from hooc_perception.core.arrays import AnyArray, Float64Array, UInt8Array
 from hooc_perception.core.geometry import back_project
+from hooc_perception.core.parsing.unexplained import Reason, TOLERANCE_M
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Observation
 from hooc_perception.evaluation.report import pictures
 from hooc_perception.evaluation.report.pictures import RGB
 import numpy as np
 
-# As core.parsing.unexplained: a pixel within this distance of the composed objects is explained.
-EXPLAINED_M = 0.02
 # Points of the page: of one scene, and of all frame sets of a sequence together.
 MAX_POINTS, MAX_SEQUENCE = 36_000, 400_000
 # One point is kept in each cube of this size; twice the size of the table.
@@ -23,7 +22,11 @@ VOXELS_M = (0.002, 0.003, 0.004, 0.006, 0.008, 0.012, 0.016, 0.024, 0.032)
 BORDER_M = (0.1, 0.1, 0.02)
 # What is farther from every object is the room behind the table.
 REACH_M = 0.5
-TABLE_RGB, UNEXPLAINED_RGB = (150, 154, 160), (255, 60, 60)
+TABLE_RGB = (150, 154, 160)
+REASON_RGB = np.zeros((len(Reason), 3))
+REASON_RGB[Reason.NOISE] = 255, 60, 60
+REASON_RGB[Reason.RESIDUE] = 255, 160, 40
+REASON_RGB[Reason.UNKNOWN] = 120, 120, 120
 KINDS = ('table', 'explained', 'unexplained')
 
 
@@ -32,7 +35,8 @@ class PointGroup:
     """
     Readings of one camera.
 
-    :ivar kind: one of KINDS; explained points have the colour of their object.
+    :ivar kind: one of KINDS; explained points have the colour of their object, unexplained ones
+        that of their Reason.
     :ivar points: (n, 3) float64 world metres.
     :ivar rgb: (n, 3) float64, 0-255.
     """
@@ -44,18 +48,20 @@ class PointGroup:
 
 
 def seen_points(observation: Observation, meshes: Sequence[tuple[AnyArray, AnyArray]],
-                colours: Sequence[RGB]) -> list[PointGroup]:
+                colours: Sequence[RGB],
+                reasons: Callable[[Float64Array], UInt8Array]) -> list[PointGroup]:
     """
     Return a PointGroup of every kind for every camera.
 
     :param meshes: posed objects, see `world_mesh`; `colours` one (r, g, b) each.
+    :param reasons: returns a Reason for each of the points (n, 3) that no object explains.
     """
     groups = []
     for view in observation.views:
         points = back_project(view.depth, view.camera)
         depth, ids = render_depth(meshes, view.camera)
         with np.errstate(invalid='ignore'):
-            explained = view.foreground & (np.abs(depth - view.depth) <= EXPLAINED_M)
+            explained = view.foreground & (np.abs(depth - view.depth) <= TOLERANCE_M)
         shade = 0.55 + 0.45 * pictures.hillshade(view.depth, view.camera)
         table = view.table & ~view.foreground & np.isfinite(view.depth)
         for kind, mask in zip(KINDS, (table, explained, view.foreground & ~explained)):
@@ -63,7 +69,7 @@ def seen_points(observation: Observation, meshes: Sequence[tuple[AnyArray, AnyAr
             if kind == 'explained':
                 rgb = np.array([*colours, (0, 0, 0)], float)[ids[mask]]
             elif kind == 'unexplained':
-                rgb[:] = UNEXPLAINED_RGB
+                rgb = REASON_RGB[reasons(points[mask])]
             groups.append(PointGroup(view.camera.name, kind, points[mask],
                                      rgb * shade[mask][:, None]))
     return groups

@@ -83,14 +83,15 @@ def _log_scene(rr: Any, recording: Any, scene: ReportScene, palette: pictures.Pa
         _log_camera(rr, recording, view)
     colours = pictures.instance_colours(scene.objects, palette)
     drawn = [i for i, o in enumerate(scene.objects) if o.category in scene.models]
-    meshes = ShownScene.of(scene).meshes
+    shown = ShownScene.of(scene)
+    meshes = shown.meshes
     for i, mesh in zip(drawn, meshes):
         place = f'world/objects/{scene.objects[i].category}/{i}'
         _log_mesh(recording, place, scene.objects[i], mesh, colours[i])
         known = scene.evidence[i] if i < len(scene.evidence) else {}
         facts = {key: value for key, value in known.items() if value is not None}
         recording.log(place, rr.AnyValues(score=scene.objects[i].score, **facts))
-    groups = seen_points(scene.observation, meshes, [colours[i] for i in drawn])
+    groups = seen_points(scene.observation, meshes, [colours[i] for i in drawn], shown.reasons)
     low, high = extent_of(groups, meshes)
     for kind in KINDS:
         mine = [group for group in groups if group.kind == kind]

@@ -3,10 +3,11 @@
 """What the report shows of a scene, from results, views and the ground truth if known."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from hooc_perception.core.arrays import Float64Array, Int32Array
+from hooc_perception.core.arrays import Float64Array, Int32Array, UInt8Array
+from hooc_perception.core.parsing.unexplained import reasons
 from hooc_perception.core.segment.config import ObserveConfig
 from hooc_perception.core.segment.observe import observe
 from hooc_perception.core.segment.rectify import rectify
@@ -17,10 +18,18 @@ from hooc_perception.core.types import (
     Observation,
     PixelProbabilities,
     RectifiedView,
+    UnknownObjects,
 )
 from hooc_perception.evaluation.errors import world_mesh
-from hooc_perception.evaluation.matching import candidate_objects, posed, PosedObject, shape_of
+from hooc_perception.evaluation.matching import (
+    candidate_objects,
+    member_of,
+    posed,
+    PosedObject,
+    shape_of,
+)
 from hooc_perception.evaluation.scores import ObjectScore, score_objects
+from hooc_perception.evaluation.stages import as_candidates
 import numpy as np
 
 # Rejected candidates are distinguished from chosen ones by their position.
@@ -117,6 +126,15 @@ class ShownScene:
         meshes, true_meshes = ([world_mesh(o, shape_of(o, scene.models)) for o in objects]
                                for objects in (drawn, true))
         return ShownScene(scene, drawn, meshes, true, true_meshes)
+
+    def reasons(self, points: Float64Array) -> UInt8Array:
+        """Return (n,) uint8, a Reason for each of the points (n, 3) that no object explains."""
+        models = list(self.scene.models.values())
+        known = as_candidates([replace(o, member=member_of(o, self.scene.models))
+                               for o in self.drawn if o.category != UNKNOWN], models)
+        boxes = as_candidates([o for o in self.drawn if o.category == UNKNOWN], models)
+        return reasons(points, known, UnknownObjects(
+            boxes.translation, boxes.rotation_xyzw, boxes.size, boxes.score, ()), models)
 
 
 def report_scene(entry: Mapping[str, Any], views: Iterable[DepthView | RectifiedView],

@@ -103,7 +103,7 @@ class Space:
     def of(scenes: Sequence[ShownScene], palette: Palette) -> 'Space':
         """Return the 3D view of one or several frame sets."""
         colours = [pictures.instance_colours(s.drawn, palette) for s in scenes]
-        groups = [seen_points(s.scene.observation, s.meshes, rgb)
+        groups = [seen_points(s.scene.observation, s.meshes, rgb, s.reasons)
                   for s, rgb in zip(scenes, colours)]
         meshes = [mesh for s in scenes for mesh in s.meshes]
         low, high = extent_of([g for step in groups for g in step], meshes)

@@ -185,15 +185,13 @@ def objects_messages(parsed: ParsedScene, ids: Sequence[int] | AnyArray, age_s: 
             cloud_message(rows, head))
 
 
-def points_message(points: AnyArray, head: Header, camera: AnyArray | None = None) -> PointCloud2:
-    """Return the PointCloud2 of (n, 3) points, with a column `camera` if (n,) is given."""
-    columns = [('x', 'f4'), ('y', 'f4'), ('z', 'f4')]
-    if camera is not None:
-        columns.append(('camera', 'u1'))
+def points_message(points: AnyArray, head: Header, **bytes_of: AnyArray) -> PointCloud2:
+    """Return the PointCloud2 of (n, 3) points, with a column of bytes for each further (n,)."""
+    columns = [('x', 'f4'), ('y', 'f4'), ('z', 'f4'), *((name, 'u1') for name in bytes_of)]
     rows = np.zeros(len(points), row_dtype(columns))
     rows['x'], rows['y'], rows['z'] = np.asarray(points).reshape(-1, 3).T
-    if camera is not None:
-        rows['camera'] = camera
+    for name, values in bytes_of.items():
+        rows[name] = values
     return cloud_message(rows, head)
 
 

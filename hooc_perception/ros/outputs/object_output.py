@@ -8,7 +8,7 @@ import json
 
 from geometry_msgs.msg import Pose, PoseArray
 from hooc_perception.chain import topic_token
-from hooc_perception.core.arrays import AnyArray
+from hooc_perception.core.parsing.unexplained import Unexplained
 from hooc_perception.core.types import GenericModel, ParsedScene
 from hooc_perception.ros.lifecycle.stage_node import StageNode
 from hooc_perception.ros.messages.conversions import header, pose_array_message, pose_message
@@ -58,13 +58,13 @@ class ObjectOutput:
         self._labels.publish(String(data=labels_json(self.models, self.meshes)))
 
     def publish(self, parsed: ParsedScene, scene: DetectedScene, age_s: float,
-                unexplained: AnyArray) -> None:
+                unexplained: Unexplained) -> None:
         """
         Publish one result; `objects/poses` goes last: once it has arrived, so has the rest.
 
         :param scene: the same with ids, stamp and frame.
         :param age_s: seconds since the stamp.
-        :param unexplained: (m, 3) world points.
+        :param unexplained: in the target frame.
         """
         head, found = scene.header, parsed.objects
         ids = np.array([o.id for o in scene.objects], np.uint32)
@@ -79,7 +79,8 @@ class ObjectOutput:
         self._unknown_attributes.publish(unknown_attributes)
         self._unknown.publish(unknown_poses)
         self._markers.publish(self._markers_message(list(poses.poses), parsed, scene))
-        self._unexplained.publish(points_message(unexplained, head))
+        self._unexplained.publish(points_message(
+            unexplained.points, head, reason=unexplained.reason))
         self._summary.publish(String(data=summary_json(parsed, scene.stamp_ns)))
         self._poses.publish(poses)
 
@@ -146,7 +147,7 @@ def empty_unknown(head: Header) -> PointCloud2:
 def empty_clouds(head: Header) -> tuple[PointCloud2, PointCloud2]:
     """Return empty `objects/attributes` and `scene/unexplained`."""
     return (cloud_message(np.zeros(0, row_dtype(OBJECT_COLUMNS)), head),
-            points_message(np.zeros((0, 3)), head))
+            points_message(np.zeros((0, 3)), head, reason=np.zeros(0, np.uint8)))
 
 
 def summary_json(parsed: ParsedScene | None, stamp_ns: int) -> str:

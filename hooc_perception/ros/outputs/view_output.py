@@ -70,4 +70,4 @@ def fused_cloud(views: Sequence[RectifiedView], head: Header) -> PointCloud2:
     points = np.concatenate(clouds)
     camera = np.repeat(np.arange(len(views), dtype=np.uint8), [len(c) for c in clouds])
     seen = np.isfinite(points[:, 2])
-    return points_message(points[seen], head, camera[seen])
+    return points_message(points[seen], head, camera=camera[seen])

@@ -16,9 +16,9 @@ from hooc_perception.core.methods.joint import JointMethod
 from hooc_perception.core.parsing.config import ParseConfig
 from hooc_perception.core.parsing.search import Search
 from hooc_perception.core.parsing.tracking import Tracker
-from hooc_perception.core.parsing.unexplained import unexplained_points
+from hooc_perception.core.parsing.unexplained import unexplained
 from hooc_perception.core.shapes import Shapes
-from hooc_perception.core.types import Candidates
+from hooc_perception.core.types import Candidates, UnknownObjects
 from hooc_perception.objects.derive import derive
 from hooc_perception.scene import scene_of
 import numpy as np
@@ -178,8 +178,8 @@ def test_volumes_are_those_of_the_members(families):
 
 def test_what_is_unexplained_depends_on_the_member(kitchen):
     wrong = replace(kitchen.truth, member=np.array([SHALLOW, 0], np.uint16))
-    left, more = (unexplained_points(kitchen.observation, x, kitchen.models, 0.008)
-                  for x in (kitchen.truth, wrong))
+    left, more = (unexplained(kitchen.observation, x, UnknownObjects.empty(), kitchen.models,
+                              0.008).points for x in (kitchen.truth, wrong))
     # The bottom of a stretched pan is 1.6 cm higher.
     assert len(more) > 1.3 * len(left) + 50
 

@@ -19,7 +19,7 @@ KEEP ?=
 FORCE ?=
 JOBS ?= 0
 
-.PHONY: help setup demo test results bundle lint docs lock clean
+.PHONY: help setup demo test results bundle network lint docs lock clean
 
 help:
 	@echo 'make demo    set up if need be, then find the objects of the bundled scene'
@@ -30,6 +30,7 @@ help:
 	@echo '             ROWS="best fast ablations", KEEP="paper fpfh ppf", FORCE="best", RESULTS=folder,'
 	@echo '             JOBS=1'
 	@echo 'make bundle  make the bundled scene and model again'
+	@echo 'make network train the network over the table again (needs the extra network, takes hours)'
 	@echo 'make lint    check style, spelling and types'
 	@echo 'make docs    build the documentation site in out/site'
 	@echo 'make lock    resolve pyproject.toml into requirements.txt again (PYTHONS="python3.11 python3.12")'
@@ -53,6 +54,9 @@ results: setup
 
 bundle: setup
 	@$(HOOC) demo --make-bundle
+
+network: setup
+	@.venv/bin/python -m hooc_perception.training.network
 
 lint: setup
 	@.venv/bin/ruff check .

@@ -18,6 +18,8 @@ EXTRA_OF: dict[str, str] = {
     'yourdfpy': 'robot',
     'lxml': 'robot',
     'distributed': 'dask',
+    'torch': 'network',
+    'onnx': 'network',
 }
 
 

@@ -26,8 +26,8 @@ HEADER = """\
 
 # pyrender asks for PyOpenGL 3.1.0, which cannot use OSMesa and has no wheel; it works with this.
 OVERRIDES = {'pyopengl': '3.1.10'}
-# Large, and only for `hooc report --rerun`.
-NOT_LOCKED = {'rerun-sdk'}
+# Large, and only for `hooc report --rerun` and for training the network over the table again.
+NOT_LOCKED = {'rerun-sdk', 'torch', 'onnx'}
 # yourdfpy asks for trimesh with everything that it can make use of (ray casting, servers,
 # drawings). Reading a URDF needs none of it, and embreex has no wheel for aarch64.
 NOT_NEEDED = {'anyio', 'colorlog', 'embreex', 'h11', 'httpcore', 'httpx', 'mapbox-earcut', 'rtree',

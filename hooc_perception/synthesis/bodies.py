@@ -3,7 +3,7 @@
 """Bodies for physics: reshaped models and their convex pieces."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from hooc_perception.core.arrays import Float64Array, Int32Array
 from hooc_perception.core.memo import latest
@@ -39,6 +39,11 @@ class Body:
     pieces: list[Float64Array]
     rest_rotations: Float64Array
     fold: int = -1
+
+    def scaled(self, factor: float) -> 'Body':
+        """Return the same body, `factor` times as large."""
+        return replace(self, vertices=self.vertices * factor,
+                       pieces=[piece * factor for piece in self.pieces])
 
 
 class BodyMaker:

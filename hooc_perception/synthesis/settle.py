@@ -52,7 +52,7 @@ def settled_models(models: Sequence[GenericModel], rng: np.random.Generator,
 
     Each arrangement varies the config; see `varied`.
 
-    :param scatter: gives the range of counts and the repeats.
+    :param scatter: gives the range of counts, the repeats and the spread of sizes.
     :param strength: how far the objects depart from the generic shapes.
     :param population: relatives of the models, from which objects are made as well.
     :param fold: make objects only from relatives of this fold, where there are any.
@@ -66,6 +66,9 @@ def settled_models(models: Sequence[GenericModel], rng: np.random.Generator,
     count = int(rng.integers(scatter.objects_low, scatter.objects_high + 1))
     chosen = rng.permutation(np.tile(np.arange(len(models)), scatter.repeats))[:count] + 1
     bodies = [maker.body(int(c), rng, strength, fold=fold) for c in chosen]
+    if scatter.size_spread > 0:
+        factors = np.clip(rng.standard_normal(len(bodies)), -2, 2) * scatter.size_spread
+        bodies = [body.scaled(factor) for body, factor in zip(bodies, np.exp(factors))]
     if strangers:
         stranger = strangers_beside(models)
         bodies += [stranger.body(rng, strength)

@@ -15,6 +15,7 @@ from hooc_perception.core.arrays import (
     UInt8Array,
 )
 from hooc_perception.core.classification import features
+from hooc_perception.core.classification.table_network import from_arrays, TableNetwork
 from hooc_perception.core.config import Config, param
 from hooc_perception.core.geometry import stage_rng
 from hooc_perception.core.profiles import profile
@@ -28,8 +29,9 @@ from hooc_perception.synthesis.training_scenes import (
     TrainingConfig,
     TrainingScene,
 )
-from hooc_perception.training.context import TrainingContext
+from hooc_perception.training.context import Arrays, TrainingContext
 from hooc_perception.training.fit_forest import quantise, thresholds
+from hooc_perception.training.network.weights import bundled
 from joblib import delayed, Parallel
 import numpy as np
 
@@ -43,7 +45,7 @@ Rows: TypeAlias = tuple[Float32Array, UInt8Array, Int8Array]
 class FusedScenesConfig(Config):
     """How many scenes the fused forest is trained on, of what kind, and what is kept of each."""
 
-    scenes: int = param(1200, 'Synthetic scenes.', '', 8, 100000)
+    scenes: int = param(600, 'Synthetic scenes.', '', 8, 100000)
     random_rigs: float = param(0.3, 'Share of scenes seen by a random rig of one to four cameras '
                                'instead of the given one, moved a little; they keep the forest '
                                'usable on any rig.', '', 0.0, 1.0)
@@ -68,6 +70,8 @@ class FusedScenesConfig(Config):
     probes: int = param(0, 'Random points of the fused field that a pixel reads in addition to '
                         'the rings; 192 of them took a third of the time without a measurable '
                         'gain.', '', 0, 5000)
+    network: bool = param(True, 'Whether the forest reads what the network over the table says '
+                          'of a pixel.')
     quantile_scenes: int = param(24, 'First scenes, which set the quantisation of the features.',
                                  '', 4, 1000)
     bins: int = param(64, 'Quantisation levels of a feature.', '', 2, 255)
@@ -100,6 +104,11 @@ def scene_config(config: FusedScenesConfig, repeats: int) -> TrainingConfig:
                               repeats=repeats, pose='resting'))
 
 
+def network_of(config: FusedScenesConfig) -> Arrays:
+    """Return the arrays of the network that the forest reads, {} = none."""
+    return bundled() if config.network else {}
+
+
 def draw_rows(y: UInt8Array, rng: np.random.Generator, rows_sqrt: float) -> Int64Array:
     """Return ascending rows: of each class with n entries in y, rows_sqrt * sqrt(n) at most."""
     rows: list[Int64Array] = []
@@ -111,17 +120,19 @@ def draw_rows(y: UInt8Array, rng: np.random.Generator, rows_sqrt: float) -> Int6
 
 
 def labelled_features(observation: Observation, scene: TrainingScene, probes: Float64Array,
-                      rng: np.random.Generator, rows_sqrt: float) -> Rows:
+                      rng: np.random.Generator, rows_sqrt: float,
+                      network: TableNetwork | None = None) -> Rows:
     """Return the Rows of drawn foreground pixels of one scene and its Observation."""
     pixels = features.foreground_pixels(observation)
     front = [view.foreground & np.isfinite(view.depth) for view in observation.views]
     y = np.concatenate([label[mask] for label, mask in zip(scene.labels, front)])
     fold = np.concatenate([each[mask] for each, mask in zip(scene.folds, front)])
     if not len(y):
-        return np.zeros((0, features.feature_count(len(probes))), np.float32), y, fold
+        return np.zeros((0, features.feature_count(len(probes), network)), np.float32), y, fold
     rows = draw_rows(y, rng, rows_sqrt)
-    around = features.surroundings(observation, pixels)
-    return features.pixel_features(pixels, around, probes, rows), y[rows], fold[rows]
+    around = features.surroundings(observation, pixels, table=network is not None)
+    x = features.pixel_features(pixels, around, probes, rows, network)
+    return x, y[rows], fold[rows]
 
 
 @dataclass(frozen=True)
@@ -131,6 +142,7 @@ class _Source:
 
     :ivar population: relatives of the models.
     :ivar repeats: most objects of one category per scene.
+    :ivar network: arrays of the network over the table, {} = none.
     """
 
     models: Sequence[GenericModel]
@@ -140,6 +152,7 @@ class _Source:
     repeats: int
     seed: int
     observe: ObserveConfig
+    network: Arrays
 
     def features(self, k: int, probes: Float64Array) -> Rows:
         """Return the Rows of drawn foreground pixels of scene k."""
@@ -151,7 +164,7 @@ class _Source:
                                        reshape_strength=strength),
                                population=self.population)
         return labelled_features(observe(scene.views, self.observe), scene, probes, rng,
-                                 config.rows_sqrt)
+                                 config.rows_sqrt, from_arrays(self.network))
 
 
 def _raw_group(source: _Source, start: int, stop: int, probes: Float64Array) -> list[Rows]:
@@ -175,7 +188,8 @@ def fused_table(context: TrainingContext, config: FusedScenesConfig,
     """
     seed, limit = context.seed, context.max_instances
     source = _Source(context.models, context.population, context.cameras, config,
-                     min(limit, 4) or 3, seed, profile(context.profile).observe)
+                     min(limit, 4) or 3, seed, profile(context.profile).observe,
+                     network_of(config))
     probes = features.draw_probes(stage_rng(seed, 'probes'), config.probes)
     first = min(config.quantile_scenes, config.scenes)
     with Parallel(n_jobs=context.jobs, return_as='generator') as parallel:

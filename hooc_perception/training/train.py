@@ -30,7 +30,12 @@ from hooc_perception.training import fit_pixels
 from hooc_perception.training.context import Arrays, TrainingContext
 from hooc_perception.training.fit_forest import fit, FitConfig, unaware_of
 from hooc_perception.training.fit_verifier import fit_verifier, VerifierConfig
-from hooc_perception.training.fused_scenes import fused_table, FusedScenesConfig, FusedTable
+from hooc_perception.training.fused_scenes import (
+    fused_table,
+    FusedScenesConfig,
+    FusedTable,
+    network_of,
+)
 import joblib
 import numpy as np
 from tqdm import tqdm
@@ -39,7 +44,7 @@ T = TypeVar('T')
 PROFILES: dict[str, tuple[Config, ...]] = {
     'paper': (fit_pixels.PixelFitConfig(),),
     'best': (FusedScenesConfig(), FitConfig(), VerifierConfig()),
-    'fast': (FusedScenesConfig(scenes=240), FitConfig(trees=24),
+    'fast': (FusedScenesConfig(scenes=240, network=False), FitConfig(trees=24),
              VerifierConfig(unfamiliar_scenes=0)),
 }
 
@@ -235,7 +240,7 @@ def _fused(context: TrainingContext, scenes: FusedScenesConfig) -> Arrays:
                      table.fold[kept])
     held_out = {'held_out_accuracy': _accuracy(forest, table, ~kept)}
     arrays = {**_head(context, KIND_FUSED, held_out), 'probes': table.probes,
-              **forest.arrays('forest_')}
+              **forest.arrays('forest_'), **network_of(scenes)}
     # The background class stands for things of no category as well.
     return {**arrays, 'strangers': np.uint8(1)} if scenes.strangers else arrays
 

@@ -123,6 +123,14 @@ def test_the_same_seed_gives_the_same_pile(models):
         np.testing.assert_array_equal(x.vertices_world, y.vertices_world)
 
 
+def test_objects_of_one_shape_come_in_several_sizes(models):
+    scatter = ScatterConfig(objects_low=5, objects_high=5, pose='resting', size_spread=0.3)
+    objects = settled_models(models, np.random.default_rng(5), scatter, 0.0)
+    ratios = np.array([o.size / models[o.category - 1].extents for o in objects])
+    assert len(ratios) >= 4 and np.allclose(ratios, ratios[:, :1], rtol=1e-3)
+    assert np.log(ratios[:, 0]).std() > 0.05 and (np.abs(np.log(ratios)) < 0.61).all()
+
+
 def test_no_models_are_refused_and_no_bodies_are_no_pile():
     with pytest.raises(HoocError, match='at least one model'):
         settled_models((), np.random.default_rng(0), ScatterConfig(), 1.0)

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from hooc_perception.core.arrays import AnyArray, Int64Array
-from hooc_perception.core.classification import features
+from hooc_perception.core.classification import features, table_network
 from hooc_perception.core.classification.features import Pixels
 from hooc_perception.core.classification.forest import DAMAGED, Forest, quantised
 from hooc_perception.core.classification.kernels import smoothing
@@ -99,12 +99,13 @@ def _fused(observation: Observation, pixels: Pixels, classifier: Mapping[str, An
     """Return (k, C) probabilities by the fused forest, and the row (n,) of each pixel in them."""
     forest = Forest.from_arrays(classifier, 'forest_')
     probes = np.ascontiguousarray(classifier['probes'], np.float64)
+    network = table_network.from_arrays(classifier)
     if probes.ndim != 2 or probes.shape[1] != 5 or (
-            forest.feature.max(initial=-1) >= features.feature_count(len(probes))):
+            forest.feature.max(initial=-1) >= features.feature_count(len(probes), network)):
         raise HoocError(DAMAGED)
-    around = features.surroundings(observation, pixels)
+    around = features.surroundings(observation, pixels, table=network is not None)
     rows, donor = smoothing.thin(pixels.camera, pixels.uv, pixels.points, config.stride)
-    p = forest.predict(features.pixel_features(pixels, around, probes, rows))
+    p = forest.predict(features.pixel_features(pixels, around, probes, rows, network))
     if config.smoothing_steps:
         p = smoothing.spread(
             p, around.voxel[rows], len(around.voxel_points), around.pairs,

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 from hooc_perception.core.arrays import (
     AnyArray,
+    BoolArray,
     Float32Array,
     Float64Array,
     Int32Array,
@@ -31,6 +32,12 @@ from hooc_perception.core.classification.kernels.projective_field import (
     ProjectiveField,
 )
 from hooc_perception.core.classification.kernels.texture import textures
+from hooc_perception.core.classification.table_network import (
+    Surface,
+    table_map,
+    TableMap,
+    TableNetwork,
+)
 from hooc_perception.core.geometry import inverse
 from hooc_perception.core.types import Observation, ObservedView
 import numpy as np
@@ -105,10 +112,11 @@ def foreground_pixels(observation: Observation) -> Pixels:
                   np.concatenate(normals), np.concatenate(residuals))
 
 
-def feature_count(n_probes: int) -> int:
+def feature_count(n_probes: int, network: TableNetwork | None = None) -> int:
     """Return the number of columns that `pixel_features` makes."""
-    return (features.FIXED_FEATURES + n_probes
-            + len(SEGMENT_SCALES) * (segments.SEGMENT_FEATURES + features.PLACE_FEATURES))
+    own = (features.FIXED_FEATURES + n_probes
+           + len(SEGMENT_SCALES) * (segments.SEGMENT_FEATURES + features.PLACE_FEATURES))
+    return own + (network.columns if network else 0)
 
 
 @dataclass(frozen=True)
@@ -121,6 +129,7 @@ class Surroundings:
     :ivar voxel_points: (m, 3) float64 mean of the points of a voxel; `voxel_normals` (m, 3).
     :ivar pairs: (e, 2) int32 voxels that touch; `weight` (e,) float32, see `segments.edges`.
     :ivar texture: (m, TEXTURE_FEATURES) float32, see `texture.textures`.
+    :ivar table: what a network sees, None where there is none.
     """
 
     field: ProjectiveField
@@ -132,16 +141,23 @@ class Surroundings:
     weight: Float32Array
     texture: Float32Array
     segments: features.Segments
+    table: TableMap | None
 
 
-def surroundings(observation: Observation, pixels: Pixels) -> Surroundings:
-    """Return the Surroundings of an Observation with at least one foreground pixel."""
+def surroundings(observation: Observation, pixels: Pixels, table: bool = False) -> Surroundings:
+    """
+    Return the Surroundings of an Observation with at least one foreground pixel.
+
+    :param table: whether a network is to be asked.
+    """
     low, high = pixels.points.min(0), pixels.points.max(0)
     low = np.array([low[0] - MARGIN_M, low[1] - MARGIN_M, -BELOW_M])
     size = high + [MARGIN_M, MARGIN_M, ABOVE_M] - low
     cell = max(FIELD_CELL_M, float(np.cbrt(np.prod(size) / MAX_CELLS)))
     nx, ny, nz = (int(n) for n in np.ceil(size / cell) + 1)
-    values = projective_field.fuse(_depth_images(observation.views), low, cell, (nx, ny, nz))
+    images, foreground = depth_images(observation.views)
+    rises = cell * np.arange(nz, dtype=np.float64)
+    values = projective_field.fuse(images, low, cell, (nx, ny), rises)
     voxel_cell = VOXEL_M * cell / FIELD_CELL_M
     gx, gy, gz = (int(n) for n in np.ceil(size / voxel_cell) + 1)
     voxel, mean, normal, grid = segments.voxelise(
@@ -150,19 +166,22 @@ def surroundings(observation: Observation, pixels: Pixels) -> Surroundings:
     texture = textures(mean, normal, pairs, np.exp(-(weight / TEXTURE_ANGLE_RAD) ** 2))
     heights = features.height_map(pixels.points, low, cell, nx, ny)
     return Surroundings(ProjectiveField(values, low, cell), heights, voxel, mean, normal, pairs,
-                        weight, texture, _segments(mean, normal, pairs, weight, voxel_cell))
+                        weight, texture, _segments(mean, normal, pairs, weight, voxel_cell),
+                        table_map(images, foreground, pixels.points) if table else None)
 
 
-def _depth_images(views: Sequence[ObservedView]) -> DepthImages:
-    """Return the depth images of views of any size in one array."""
+def depth_images(views: Sequence[ObservedView]) -> tuple[DepthImages, BoolArray]:
+    """Return the depth images and foregrounds (V, H, W) of views of any size."""
     heights = np.array([v.depth.shape[0] for v in views])
     widths = np.array([v.depth.shape[1] for v in views])
     depth = np.full((len(views), heights.max(), widths.max()), np.nan, np.float32)
+    foreground = np.zeros(depth.shape, bool)
     for i, view in enumerate(views):
         depth[i, :heights[i], :widths[i]] = view.depth
+        foreground[i, :heights[i], :widths[i]] = view.foreground
     return DepthImages(
         depth, heights, widths, np.stack([np.asarray(v.camera.K, np.float64) for v in views]),
-        np.stack([inverse(v.camera.T_world_camera) for v in views]))
+        np.stack([inverse(v.camera.T_world_camera) for v in views])), foreground
 
 
 def _segments(mean: Float64Array, normal: Float64Array, pairs: Int32Array, weight: Float32Array,
@@ -181,16 +200,21 @@ def _segments(mean: Float64Array, normal: Float64Array, pairs: Int32Array, weigh
 
 
 def pixel_features(pixels: Pixels, around: Surroundings, probes: Float64Array,
-                   rows: AnyArray) -> Float32Array:
+                   rows: AnyArray, network: TableNetwork | None = None) -> Float32Array:
     """
-    Return (len(rows), feature_count(len(probes))) float32 features of the chosen pixels.
+    Return (len(rows), feature_count(len(probes), network)) float32 features of the chosen pixels.
 
     :param rows: (k,) integer rows of `pixels`.
     :param probes: (P, 5) from `draw_probes`; part of a trained classifier.
+    :param network: describes the pixels on the map of `around` in the last columns.
     """
     out = np.empty((len(rows), feature_count(len(probes))), np.float32)
     queries = features.Queries(pixels.points[rows], pixels.normals[rows].astype(np.float64),
                                pixels.residual[rows], around.voxel[rows])
     features.point_features(queries, around.field, around.heights, around.texture,
                             around.segments, np.ascontiguousarray(probes), out)
-    return out
+    if network is None:
+        return out
+    assert around.table is not None
+    surface = Surface(pixels.points[rows], pixels.normals[rows], pixels.residual[rows])
+    return np.concatenate([out, network.describe(around.table, surface)], axis=1)

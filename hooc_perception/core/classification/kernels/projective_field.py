@@ -54,24 +54,26 @@ class DepthImages(NamedTuple):
 
 
 @nb.njit(cache=True)
-def _raise_column(column: Int8Array, images: DepthImages, v: int, x: float, y: float,
-                  z: float, cell: float) -> None:
+def _raise_column(column: Int8Array, images: DepthImages, v: int,
+                  foot: tuple[float, float, float], rises: Float64Array) -> None:
     """
     Raise the cells of one vertical column (nz,) to what view v measures behind them.
 
-    :param x, y, z: centre of the lowest cell, metres, world.
+    :param foot: a point of the column, metres, world.
+    :param rises: (nz,) heights of the cells' centres above it, metres.
     """
+    x, y, z = foot
     T, K = images.T_camera_world[v], images.K[v]
     fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     xc = T[0, 0] * x + T[0, 1] * y + T[0, 2] * z + T[0, 3]
     yc = T[1, 0] * x + T[1, 1] * y + T[1, 2] * z + T[1, 3]
     zc = T[2, 0] * x + T[2, 1] * y + T[2, 2] * z + T[2, 3]
     for k in range(column.shape[0]):
-        depth = zc + T[2, 2] * k * cell
+        depth = zc + T[2, 2] * rises[k]
         if depth < NEAR_M:
             continue
-        u = int(fx * (xc + T[0, 2] * k * cell) / depth + cx + 0.5)
-        w = int(fy * (yc + T[1, 2] * k * cell) / depth + cy + 0.5)
+        u = int(fx * (xc + T[0, 2] * rises[k]) / depth + cx + 0.5)
+        w = int(fy * (yc + T[1, 2] * rises[k]) / depth + cy + 0.5)
         if u < 0 or w < 0 or u >= images.widths[v] or w >= images.heights[v]:
             continue
         d = images.depth[v, w, u]
@@ -83,18 +85,22 @@ def _raise_column(column: Int8Array, images: DepthImages, v: int, x: float, y: f
 
 
 @nb.njit(cache=True, parallel=True)
-def fuse(images: DepthImages, origin: Float64Array, cell: float,
-         shape: tuple[int, int, int]) -> Int8Array:
-    """Return the `values` of the ProjectiveField over all views, see there."""
-    nx, ny, nz = shape
-    out = np.empty((nx, ny, nz), np.int8)
+def fuse(images: DepthImages, origin: Float64Array, cell: float, shape: tuple[int, int],
+         rises: Float64Array) -> Int8Array:
+    """
+    Return (nx, ny, nz) int8 values as those of the ProjectiveField, see there.
+
+    :param rises: (nz,) heights of the cells' centres above the origin, metres.
+    """
+    nx, ny = shape
+    out = np.empty((nx, ny, len(rises)), np.int8)
     for i in nb.prange(nx):
         x = origin[0] + i * cell
         for j in range(ny):
             y = origin[1] + j * cell
             out[i, j] = UNKNOWN
             for v in range(images.depth.shape[0]):
-                _raise_column(out[i, j], images, v, x, y, origin[2], cell)
+                _raise_column(out[i, j], images, v, (x, y, origin[2]), rises)
     return out
 
 

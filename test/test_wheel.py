@@ -115,6 +115,12 @@ def test_importing_the_package_imports_nothing_heavy(prefix):
     assert version and place.startswith(str(prefix)) and heavy.strip() == '[]'
 
 
+def test_the_network_is_part_of_the_wheel(prefix):
+    run = call(prefix, 'python', '-c', 'from hooc_perception.training.network.weights import '
+               'bundled; print(len(bundled()["network_net"]))')
+    assert run.returncode == 0 and int(run.stdout) > 1_000_000, run.stderr
+
+
 def test_no_extra_is_there(prefix):
     run = call(prefix, 'python', '-c', 'import mujoco')
     assert 'ModuleNotFoundError' in run.stderr

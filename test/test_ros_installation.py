@@ -27,8 +27,9 @@ KEYS = {
     'open3d': 'python3-open3d-pip', 'fcl': 'python-fcl-pip', 'yourdfpy': 'python3-yourdfpy-pip',
 }
 WITHOUT_KEY = {'manifold3d', 'mcap', 'lz4', 'zstandard'}
-# What a robot may do without: message packages that are asked for by parameters, viewers, Dask.
-OPTIONAL = {'vision_msgs', 'moveit_msgs', 'pyrender', 'rerun', 'distributed'}
+# What a robot may do without: message packages that are asked for by parameters, viewers, Dask,
+# training again what comes with the package.
+OPTIONAL = {'vision_msgs', 'moveit_msgs', 'pyrender', 'rerun', 'distributed', 'torch'}
 # Needed, but not by an import statement: networkx and collada by trimesh, tf2_msgs by name, the
 # rest by the command `ros2 launch` and by Open3D.
 NOT_IMPORTED = {'python3-networkx', 'python3-collada', 'tf2_msgs', 'ros2launch', 'libusb-1.0'}

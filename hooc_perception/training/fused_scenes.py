@@ -142,7 +142,6 @@ class _Source:
 
     :ivar population: relatives of the models.
     :ivar repeats: most objects of one category per scene.
-    :ivar network: arrays of the network over the table, {} = none.
     """
 
     models: Sequence[GenericModel]
@@ -152,7 +151,6 @@ class _Source:
     repeats: int
     seed: int
     observe: ObserveConfig
-    network: Arrays
 
     def features(self, k: int, probes: Float64Array) -> Rows:
         """Return the Rows of drawn foreground pixels of scene k."""
@@ -164,7 +162,7 @@ class _Source:
                                        reshape_strength=strength),
                                population=self.population)
         return labelled_features(observe(scene.views, self.observe), scene, probes, rng,
-                                 config.rows_sqrt, from_arrays(self.network))
+                                 config.rows_sqrt, from_arrays(network_of(config)))
 
 
 def _raw_group(source: _Source, start: int, stop: int, probes: Float64Array) -> list[Rows]:
@@ -188,8 +186,7 @@ def fused_table(context: TrainingContext, config: FusedScenesConfig,
     """
     seed, limit = context.seed, context.max_instances
     source = _Source(context.models, context.population, context.cameras, config,
-                     min(limit, 4) or 3, seed, profile(context.profile).observe,
-                     network_of(config))
+                     min(limit, 4) or 3, seed, profile(context.profile).observe)
     probes = features.draw_probes(stage_rng(seed, 'probes'), config.probes)
     first = min(config.quantile_scenes, config.scenes)
     with Parallel(n_jobs=context.jobs, return_as='generator') as parallel:

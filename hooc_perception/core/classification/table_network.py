@@ -179,13 +179,13 @@ class TableNetwork:
     def __init__(self, net: UInt8Array, layers: Sequence[tuple[Float32Array, Float32Array]],
                  ) -> None:
         self._net = cv2.dnn.readNetFromONNX(net)
-        self._layers = tuple(layers)
+        self._layers = [(np.ascontiguousarray(weight.T), bias) for weight, bias in layers]
         self._lock = Lock()
 
     @property
     def columns(self) -> int:
         """Return the number of features that `describe` gives."""
-        *_, (inner, _), (last, _) = self._layers
+        *_, (_, inner), (_, last) = self._layers
         return len(inner) + len(last)
 
     def describe(self, table: TableMap, surface: Surface) -> Float32Array:
@@ -195,23 +195,23 @@ class TableNetwork:
         These are the perceptron's last hidden layer and its logits, of which the forest makes
         classes: the network's own classes are not those of the model.
         """
-        x = np.concatenate([*self._levels(table, surface.points), point_features(surface)], axis=1)
-        hidden = x
+        hidden = np.concatenate([*self._levels(table, surface.points), point_features(surface)],
+                                axis=1)
         for weight, bias in self._layers[:-1]:
-            hidden = np.maximum(hidden @ weight.T + bias, 0)
-        weight, bias = self._layers[-1]
-        return np.concatenate([hidden, hidden @ weight.T + bias], axis=1)
+            hidden = np.maximum(kernels.dense(hidden, weight, bias), 0)
+        return np.concatenate([hidden, kernels.dense(hidden, *self._layers[-1])], axis=1)
 
     def _levels(self, table: TableMap, points: Float64Array) -> Iterator[Float32Array]:
         """Yield (n, C) float32 of each of the network's levels at the points' places."""
+        places = (points[:, :2] - table.grid.origin[:2]) / table.grid.cell
+        # The outputs are OpenCV's memory until the next call.
         with self._lock:
             self._net.setInput(halved(table.channels)[None])
             levels = self._net.forward([f'level{k}' for k in range(LEVELS)])
-        places = (points[:, :2] - table.grid.origin[:2]) / table.grid.cell
-        for k, layers in enumerate(levels):
-            out = np.empty((len(points), layers.shape[1]), np.float32)
-            kernels.sample(layers[0], (places + 0.5) / (2 << k) - 0.5, out)
-            yield out
+            for k, layers in enumerate(levels):
+                out = np.empty((len(points), layers.shape[1]), np.float32)
+                kernels.sample(layers[0], (places + 0.5) / (2 << k) - 0.5, out)
+                yield out
 
 
 def with_digest(arrays: Mapping[str, AnyArray], prefix: str = PREFIX) -> dict[str, AnyArray]:

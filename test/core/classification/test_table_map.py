@@ -93,6 +93,14 @@ def test_interpolation_is_bilinear_and_takes_the_border_beyond():
     assert np.abs(out - want).max() < 1e-5
 
 
+def test_a_dense_layer_is_a_product_with_a_bias():
+    rng = np.random.default_rng(0)
+    x, weight, bias = (rng.normal(size=shape).astype(np.float32)
+                       for shape in ((50, 30), (30, 20), (20,)))
+    x[::3, ::2] = 0
+    assert np.abs(table_map.dense(x, weight, bias) - (x @ weight + bias)).max() < 1e-4
+
+
 def test_halving_keeps_every_cell_of_a_block():
     maps = np.arange(2 * 4 * 6, dtype=np.float32).reshape(2, 4, 6)
     halved = table_network.halved(maps)

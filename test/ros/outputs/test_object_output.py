@@ -6,6 +6,7 @@ from dataclasses import replace
 import json
 from types import SimpleNamespace
 
+from hooc_perception.core.parsing.unexplained import Reason, Unexplained
 from hooc_perception.core.types import Candidates, Energy, ParsedScene, UnknownObjects
 from hooc_perception.objects.derive import derive
 import numpy as np
@@ -21,6 +22,7 @@ from hooc_perception.ros.outputs.object_output import ObjectOutput
 import trimesh  # noqa: E402
 
 STAMP = 1_700_000_000_250_000_000
+LEFT = Unexplained(np.array([[0.1, 0.2, 0.3]]), np.array([Reason.RESIDUE], np.uint8))
 MESHES = [[('file:///pan.ply', 'p0'), ('file:///pan.1.ply', 'p1')], [('file:///can.ply', 'c0')]]
 
 
@@ -54,8 +56,13 @@ def sent(models, parsed):
         publish=topics.setdefault(name or topic, []).append))
     output = ObjectOutput(node, models, MESHES)
     scene = detected_scene(parsed, np.array([7, 8, 9], np.uint32), models, STAMP, 'table')
-    output.publish(parsed, scene, 0.1, np.zeros((0, 3)))
+    output.publish(parsed, scene, 0.1, LEFT)
     return topics
+
+
+def test_what_is_unexplained_comes_with_its_reason(sent):
+    row, = cloud_rows(sent['scene/unexplained'][0])
+    assert (row['reason'], round(float(row['z']), 6)) == (Reason.RESIDUE, 0.3)
 
 
 def test_markers_have_the_mesh_of_the_member_at_its_scale(sent):
@@ -105,7 +112,7 @@ def test_things_of_no_category_have_topics_and_markers_of_their_own(models, pars
     output = ObjectOutput(node, models, MESHES)
     known = np.array([7, 8, 9], np.uint32)
     scene = detected_scene(open_scene, known, models, STAMP, 'table', np.array([11], np.uint32))
-    output.publish(open_scene, scene, 0.1, np.zeros((0, 3)))
+    output.publish(open_scene, scene, 0.1, LEFT)
     poses, attributes = topics['objects/unknown'][0], topics['objects/unknown_attributes'][0]
     assert poses.header.frame_id == 'table' and len(topics['objects/poses'][0].poses) == 3
     assert poses.poses[0].position.y == -0.3
@@ -121,7 +128,7 @@ def test_things_of_no_category_have_topics_and_markers_of_their_own(models, pars
     assert thing['id'] == 11 and thing['size'] == pytest.approx([0.1, 0.2, 0.06])
     # It goes as it came: its marker, and its row.
     output.publish(parsed, detected_scene(parsed, known, models, STAMP + 1, 'table'), 0.1,
-                   np.zeros((0, 3)))
+                   LEFT)
     assert topics['objects/unknown'][1].poses == []
     assert [(m.id, m.action) for m in topics['objects/markers'][1].markers
             if m.ns == 'unknown'] == [(11, marker.DELETE)]

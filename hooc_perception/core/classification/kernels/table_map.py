@@ -81,3 +81,22 @@ def sample(layers: Float32Array, places: Float64Array, out: Float32Array) -> Non
             near = layers[c, i, j] * (1 - b) + layers[c, i, j + 1] * b
             far = layers[c, i + 1, j] * (1 - b) + layers[c, i + 1, j + 1] * b
             out[k, c] = near * (1 - a) + far * a
+
+
+@nb.njit(cache=True, parallel=True)
+def dense(x: Float32Array, weight: Float32Array, bias: Float32Array) -> Float32Array:
+    """
+    Return (n, m) float32 x @ weight + bias of x (n, k), weight (k, m) and bias (m,).
+
+    Libraries of linear algebra give other last bits on other numbers of threads.
+    """
+    out = np.empty((len(x), weight.shape[1]), np.float32)
+    for r in nb.prange(len(x)):
+        row = out[r]
+        row[:] = bias
+        for k in range(x.shape[1]):
+            value = x[r, k]
+            if value != 0:
+                for j in range(len(row)):
+                    row[j] += value * weight[k, j]
+    return out

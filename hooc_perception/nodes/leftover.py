@@ -31,7 +31,7 @@ class Leftover:
         :param objects, unknown: in the target frame.
         """
         key = (observation, objects.translation, objects.rotation_xyzw, objects.size,
-               unknown.translation, unknown.size)
+               unknown.translation, unknown.rotation_xyzw, unknown.size)
         if self._last is None or self._last[0][0] is not observation or not all(
                 map(np.array_equal, key[1:], self._last[0][1:])):
             self._last = key, unexplained(observation.in_target_frame(), objects, unknown,

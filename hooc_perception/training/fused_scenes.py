@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import cast, TypeAlias
 
 from hooc_perception.core.arrays import (
+    AnyArray,
     Float32Array,
     Float64Array,
     Int8Array,
@@ -119,14 +120,19 @@ def draw_rows(y: UInt8Array, rng: np.random.Generator, rows_sqrt: float) -> Int6
     return np.sort(np.concatenate(rows)) if rows else np.zeros(0, np.int64)
 
 
+def at_foreground(observation: Observation, images: Sequence[AnyArray]) -> AnyArray:
+    """Return (n,) the values of images, (H, W) per view, at the pixels of `foreground_pixels`."""
+    return np.concatenate([image[view.foreground & np.isfinite(view.depth)]
+                           for image, view in zip(images, observation.views)])
+
+
 def labelled_features(observation: Observation, scene: TrainingScene, probes: Float64Array,
                       rng: np.random.Generator, rows_sqrt: float,
                       network: TableNetwork | None = None) -> Rows:
     """Return the Rows of drawn foreground pixels of one scene and its Observation."""
     pixels = features.foreground_pixels(observation)
-    front = [view.foreground & np.isfinite(view.depth) for view in observation.views]
-    y = np.concatenate([label[mask] for label, mask in zip(scene.labels, front)])
-    fold = np.concatenate([each[mask] for each, mask in zip(scene.folds, front)])
+    y = at_foreground(observation, scene.labels)
+    fold = at_foreground(observation, scene.folds)
     if not len(y):
         return np.zeros((0, features.feature_count(len(probes), network)), np.float32), y, fold
     rows = draw_rows(y, rng, rows_sqrt)

@@ -14,6 +14,7 @@ from hooc_perception.core.types import Candidates, GenericModel, Observation, Un
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+# A pixel is explained where the composed depth of all objects is so near to the measured one.
 TOLERANCE_M = 0.02
 # How far beyond the box of a thing its readings may lie.
 BOX_MARGIN_M = 0.01

@@ -11,14 +11,13 @@ from hooc_perception.core.arrays import BoolArray, Float64Array
 from hooc_perception.core.frame.frame import Frame
 from hooc_perception.core.geometry import posed_meshes
 from hooc_perception.core.parsing.groups import grouped, near_surfaces
+from hooc_perception.core.parsing.unexplained import TOLERANCE_M
 from hooc_perception.core.render import render_depth
 from hooc_perception.core.types import Candidates, Observation, UnknownObjects
 import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.transform import Rotation
 
-# A pixel is explained where the composed depth of all objects is so near to the measured one.
-TOLERANCE_M = 0.02
 # Of a point of the cloud, the share of pixels that must be open.
 OPEN_SHARE = 0.5
 # A thing has so many cells and this extent; less is noise or the rest of an object.

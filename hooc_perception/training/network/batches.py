@@ -8,6 +8,7 @@ from typing import NamedTuple
 from hooc_perception.core.classification.table_network import (
     CELL_M,
     channels,
+    POINT_FEATURES,
     point_features,
 )
 from hooc_perception.training.network.examples import Example
@@ -47,7 +48,7 @@ def batch(examples: Sequence[Example], n: int, rng: np.random.Generator | None =
     places = torch.zeros(count, n, 2)
     y = torch.full((count, n), NO_POINT)
     turns, warps = _motions(count, rng, stretch)
-    maps, points = [], torch.zeros(count, n, point_features(examples[0].surface).shape[1])
+    maps, points = [], torch.zeros(count, n, POINT_FEATURES)
     for k, example in enumerate(examples):
         rows = np.arange(len(example.y))
         if rng is not None:

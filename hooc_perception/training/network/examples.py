@@ -28,7 +28,7 @@ from hooc_perception.synthesis.training_scenes import (
     TrainingConfig,
     TrainingScene,
 )
-from hooc_perception.training.fused_scenes import draw_rows
+from hooc_perception.training.fused_scenes import at_foreground, draw_rows
 from joblib import delayed, Parallel
 import numpy as np
 
@@ -127,8 +127,7 @@ def labelled(scene: TrainingScene, rng: np.random.Generator, rows_sqrt: float) -
     pixels = features.foreground_pixels(observation)
     if not len(pixels.points):
         return None
-    y = np.concatenate([label[view.foreground & np.isfinite(view.depth)]
-                        for label, view in zip(scene.labels, observation.views)])
+    y = at_foreground(observation, scene.labels)
     rows = draw_rows(y, rng, rows_sqrt)
     n = table_network.FEWEST_CELLS
     middle = (pixels.points[:, :2].min(0) + pixels.points[:, :2].max(0)) / 2
